@@ -1,0 +1,17 @@
+# mf_add_library(NAME SOURCES ... LINKS ...): a folder of the house is one static library.
+function(mf_add_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  add_library(${name} STATIC ${ARG_SOURCES})
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${name} PUBLIC ${ARG_LINKS} PRIVATE mf_warnings ${ARG_PRIVATE_LINKS})
+endfunction()
+
+# mf_add_test(NAME SOURCES ... LINKS ... LABELS ...): one gtest program, one ctest entry.
+# Exit code 77 (every test of the program skipped) is a visible skip.
+function(mf_add_test name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINKS;LABELS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE mf_test_main mf_warnings ${ARG_LINKS})
+  add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_BINARY_DIR})
+  set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 LABELS "${ARG_LABELS}" TIMEOUT 900)
+endfunction()

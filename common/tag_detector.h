@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/image.h"
+
+namespace mf {
+
+// A tag found in a picture. Pixel centres at +0.5.
+struct TagDetection {
+  int id = 0;
+  // The black square's corners, in the order of PlanarTag::corners_m(): lower left, lower right, upper right, upper
+  // left as the tag is read (so they run counter-clockwise on the tag seen from its front).
+  std::array<Eigen::Vector2d, 4> corners_px;
+  int corrected_bits = 0;      // 0: every payload bit was read right
+  double decision_margin = 0;  // mean contrast of the payload bits, in 8-bit levels
+};
+
+struct TagDetectorOptions {
+  std::string family = "tag36h11";
+  double quad_decimate = 1;  // quads are searched in a picture this many times smaller, ≥ 1; faster, misses small tags
+  double quad_sigma = 0;     // Gaussian blur in pixels before the search, ≥ 0; for noisy pictures
+  int max_corrected_bits = 1;  // 0 to 3: more finds more tags and more ghosts
+};
+
+// AprilTag (Wang & Olson 2016) on **linear** pictures. Not thread-safe: one detector a thread (apriltag #387).
+// Throws InputError for a family it does not know.
+class TagDetector {
+ public:
+  explicit TagDetector(const TagDetectorOptions&);
+  TagDetector(TagDetector&&) noexcept;
+  TagDetector& operator=(TagDetector&&) noexcept;
+  ~TagDetector();
+
+  // `linear`: one channel, proportional to radiance, any scale: it is stretched to 8 bits between robust extremes.
+  [[nodiscard]] std::vector<TagDetection> detect(const ImageF& linear);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mf

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace mf {
+
+// The directions of an incident light field: the vertices of a frequency-subdivided icosahedron (a geodesic sphere)
+// whose cells reach above the plane. Ihrke et al. 2008, §4.3.
+//
+// Plane frame: z is the plane's normal; a direction points from the plane towards the light, unit length, z > 0.
+// The cells are the spherical Voronoi cells of the geodesic vertices, cut off at the horizon: they tile the hemisphere,
+// so the solid angles sum to 2π. A cell that the horizon cuts is represented by the centroid of what is left.
+struct DirectionSet {
+  int frequency = 0;  // subdivisions of an icosahedron's edge
+  std::vector<Eigen::Vector3f> directions;
+  std::vector<float> solid_angles_sr;
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // over the directions, for interpolation
+
+  [[nodiscard]] std::size_t size() const { return directions.size(); }
+};
+
+// The set whose size is nearest to `count` (sizes go by 5 f² and a rim). Precondition: count ≥ 6.
+[[nodiscard]] DirectionSet geodesic_hemisphere(int count);
+[[nodiscard]] DirectionSet geodesic_hemisphere_of_frequency(int frequency);
+
+// Where a direction falls among its neighbours: barycentric weights over three directions (sum 1, none negative).
+struct DirectionWeights {
+  std::array<std::uint32_t, 3> index{};
+  std::array<float, 3> weight{};
+};
+
+// Finds them in constant time. Directions below the rim of the set get the nearest rim triangle's edge.
+class DirectionLocator {
+ public:
+  explicit DirectionLocator(const DirectionSet&);
+  [[nodiscard]] DirectionWeights locate(const Eigen::Vector3f& direction) const;
+
+ private:
+  const DirectionSet* set_;  // outlives the locator
+  int grid_ = 0;
+  std::vector<std::vector<std::uint32_t>> triangles_in_cell_;  // by octahedral cell of the hemisphere
+};
+
+}  // namespace mf
