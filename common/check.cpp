@@ -7,9 +7,9 @@
 
 namespace mf {
 
-void check(bool condition, std::string_view what, std::source_location where) {
+void check(bool condition, std::string_view what, const char* file, int line) {
   if (condition) return;
-  throw std::logic_error(fmt::format("{}:{}: internal error: {}", where.file_name(), where.line(), what));
+  throw std::logic_error(fmt::format("{}:{}: internal error: {}", file, line, what));
 }
 
 }  // namespace mf

@@ -17,7 +17,7 @@ constexpr std::array<const char*, 6> known_families{"tag36h11",      "tag25h9", 
                                                     "tagCircle21h7", "tagStandard41h12", "tagStandard52h13"};
 
 std::string family_from_json(const nlohmann::json& json, const std::string& file) {
-  const std::string family = json_field<std::string>(json, "family", file);
+  std::string family = json_field<std::string>(json, "family", file);
   if (!is_known_tag_family(family))
     throw InputError(file, "family",
                      fmt::format("'{}' is no tag family known here: use tag36h11, tag25h9, tag16h5, "
