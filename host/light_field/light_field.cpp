@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/light_field.h"
+
+#include <algorithm>
+
+namespace mf {
+
+Eigen::Vector4f sample_tile(const LightField& field, std::size_t direction, const Eigen::Vector2f& p_in_plane) {
+  const float n = static_cast<float>(field.resolution);
+  const Eigen::Vector2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
+  const float x = std::clamp((p_in_plane.x() - low.x()) / (high.x() - low.x()) * n - 0.5F, 0.0F, n - 1);
+  const float y = std::clamp((high.y() - p_in_plane.y()) / (high.y() - low.y()) * n - 0.5F, 0.0F, n - 1);
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, field.resolution - 1), y1 = std::min(y0 + 1, field.resolution - 1);
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const Eigen::Vector4f* tile = field.tile(direction);
+  Eigen::Vector3f colour = Eigen::Vector3f::Zero();
+  float confidence = 0;
+  const auto add = [&](int tx, int ty, float weight) {
+    const Eigen::Vector4f& texel = tile[ty * field.resolution + tx];
+    colour += weight * texel.w() * texel.head<3>();  // a texel that no view saw does not darken its neighbours
+    confidence += weight * texel.w();
+  };
+  add(x0, y0, (1 - fx) * (1 - fy));
+  add(x1, y0, fx * (1 - fy));
+  add(x0, y1, (1 - fx) * fy);
+  add(x1, y1, fx * fy);
+  Eigen::Vector4f out = Eigen::Vector4f::Zero();
+  if (confidence > 0) out << colour / confidence, confidence;
+  return out;
+}
+
+}  // namespace mf

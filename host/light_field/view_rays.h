@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host/light_field/field_views.h"
+#include "host/light_field/light_field.h"
+
+namespace mf {
+
+// "plane" → 0, "sphere:2.5" → 2.5, "sphere:inf" → infinity. Nothing for anything else or a radius that is not positive.
+[[nodiscard]] std::optional<FieldProxy> parse_proxy(std::string_view);
+[[nodiscard]] std::string proxy_name(const FieldProxy&);
+
+// 1 / distance along the ray from p towards ω at which it meets a sphere of the radius about `centre` (p inside); 0
+// when the surroundings are distant. All in one frame, metres.
+[[nodiscard]] float inverse_distance_to_sphere(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
+                                               const Eigen::Vector3f& centre, double radius_m);
+
+// A point of the proxy, homogeneous and in the world: (ω + s p, s) for the ray from p towards ω that meets the proxy at
+// the distance 1/s; s = 0 is a direction.
+using ProxyPoint = Eigen::Vector4f;
+[[nodiscard]] inline ProxyPoint proxy_point(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
+                                            float inverse_distance) {
+  ProxyPoint x;
+  x << direction + inverse_distance * p, inverse_distance;
+  return x;
+}
+
+// From a view's centre towards the proxy point; any length.
+[[nodiscard]] inline Eigen::Vector3f ray_to(const ProxyPoint& x, const Eigen::Vector3f& centre) {
+  return x.head<3>() - x.w() * centre;
+}
+
+// Buehler's angular penalty at the proxy point X, for a view with centre C: how far the ray from X to C passes by p,
+// metres. Unlike the angle at X it stays meaningful for distant surroundings, and for one ray it orders the views
+// alike.
+[[nodiscard]] inline float ray_distance(const Eigen::Vector3f& p, const ProxyPoint& x, const Eigen::Vector3f& centre) {
+  const Eigen::Vector3f ray = ray_to(x, centre);
+  return (p - centre).cross(ray).norm() / ray.norm();
+}
+
+// Level-0 pixel (u·w, v·w, w) at which a view sees the proxy point. Visible only when w > 0.
+[[nodiscard]] inline Eigen::Vector3f pixel_of(const FieldView& view, const ProxyPoint& x) {
+  return view.pixel_from_world * x;
+}
+
+// The level of a view whose texels are as large as an angle seen from p, or just smaller: floor(log2(angle in pixels)).
+[[nodiscard]] int level_for_angle(const FieldView& view, const ProxyPoint& x, float angle_rad);
+
+}  // namespace mf
