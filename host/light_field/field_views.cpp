@@ -139,7 +139,6 @@ void set_geometry(FieldView& view, const Calibration& calibration, const PixelBo
   view.pixel_from_world = (k * reflected_from_world.topRows<3>()).cast<float>();
   view.centre_in_world = (calibration.cam_from_world->inverse() * virtual_view.centre_in_cam()).cast<float>();
   view.focal_px = static_cast<float>(0.5 * (camera.fx() + camera.fy()) * scale);
-  return true;
 }
 
 }  // namespace

@@ -14,20 +14,18 @@ Eigen::Vector4f sample_tile(const LightField& field, std::size_t direction, cons
   const int x1 = std::min(x0 + 1, field.resolution - 1), y1 = std::min(y0 + 1, field.resolution - 1);
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
   const Eigen::Vector4f* tile = field.tile(direction);
-  Eigen::Vector3f colour = Eigen::Vector3f::Zero();
-  float confidence = 0;
+  Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · confidence, confidence
   const auto add = [&](int tx, int ty, float weight) {
     const Eigen::Vector4f& texel = tile[ty * field.resolution + tx];
-    colour += weight * texel.w() * texel.head<3>();  // a texel that no view saw does not darken its neighbours
-    confidence += weight * texel.w();
+    const float c = texel.w();  // a texel that no view saw does not darken its neighbours
+    sum += weight * c * Eigen::Vector4f(texel.x(), texel.y(), texel.z(), 1);
   };
   add(x0, y0, (1 - fx) * (1 - fy));
   add(x1, y0, fx * (1 - fy));
   add(x0, y1, (1 - fx) * fy);
   add(x1, y1, fx * fy);
-  Eigen::Vector4f out = Eigen::Vector4f::Zero();
-  if (confidence > 0) out << colour / confidence, confidence;
-  return out;
+  if (sum.w() <= 0) return Eigen::Vector4f::Zero();
+  return {sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), sum.w()};
 }
 
 }  // namespace mf

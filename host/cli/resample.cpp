@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/error.h"
+#include "common/response_curve.h"
+#include "common/session.h"
+#include "host/cli/command.h"
+#include "host/cli/run_resample.h"
+#include "host/light_field/view_rays.h"
+
+namespace mf {
+
+namespace {
+
+struct Arguments {
+  std::filesystem::path session;
+  std::filesystem::path output;
+  ResampleOptions options;
+  std::vector<double> rectangle;
+  bool json = false;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+nlohmann::json radius_to_json(const FieldProxy& proxy) {
+  return std::isinf(proxy.radius_m) ? nlohmann::json("inf") : nlohmann::json(proxy.radius_m);
+}
+
+nlohmann::json summarize(const ResampleResult& r) {
+  nlohmann::json scores = nlohmann::json::array();
+  for (const ProxyScore& s : r.proxy_scores)
+    scores.push_back({{"radius_m", radius_to_json(s.proxy)}, {"inconsistency_stops", s.inconsistency}});
+  const PlaneRectangle& plane = r.field.plane;
+  return {{"proxy", proxy_name(r.field.proxy)},
+          {"proxy_scores", scores},
+          {"directions", r.field.directions.size()},
+          {"size", r.field.resolution},
+          {"views", r.views},
+          {"rectangle_m", {plane.min_m.x(), plane.min_m.y(), plane.max_m.x(), plane.max_m.y()}},
+          {"height_m", plane.world_from_plane.translation.z()},
+          {"mean_confidence", r.mean_confidence},
+          {"seconds", r.seconds}};
+}
+
+void run(Arguments& a) {
+  if (!a.rectangle.empty())
+    a.options.rectangle = std::array<double, 4>{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
+  const ResampleResult r = run_resample(a.session, a.output, a.options, progress_bar());
+  const Eigen::Vector2d size = r.field.plane.size_m();
+  print_summary(
+      a.json, summarize(r),
+      fmt::format(
+          "{} views → {} directions × {}² texels over {:.2f} × {:.2f} m, proxy {}, mean confidence {:.2f}\n{}\n",
+          r.views, r.field.directions.size(), r.field.resolution, size.x(), size.y(), proxy_name(r.field.proxy),
+          r.mean_confidence, a.output.string()));
+}
+
+}  // namespace
+
+ResampleResult run_resample(const std::filesystem::path& folder, const std::filesystem::path& output,
+                            const ResampleOptions& options, const Progress& progress) {
+  if (const auto problem = options.validate())
+    throw InputError("resample", "--" + problem->substr(0, problem->find(':')),
+                     problem->substr(problem->find(':') + 2));
+  auto start = std::chrono::steady_clock::now();
+  const SessionReader session(folder);
+  const ResponseCurve response = read_response_curve(folder / "response.json");
+  const Calibration calibration = read_calibration(folder / "calibration.json");
+  std::optional<PlaneRectangle> rectangle;
+  if (options.rectangle) {
+    const auto& r = *options.rectangle;
+    rectangle = PlaneRectangle{{Eigen::Quaterniond::Identity(), {0, 0, options.height_m}}, {r[0], r[1]}, {r[2], r[3]}};
+  } else {
+    rectangle = covered_rectangle(calibration, session.header().target, options.height_m);
+  }
+  if (!rectangle)
+    throw InputError((folder / "calibration.json").string(), "frames",
+                     "no mirror view looks through the plane at this --height: lower it, or give --rectangle");
+  const std::vector<FieldView> views = load_field_views(session, response, calibration, {}, progress);
+  const double loading = seconds_since(start);
+  ResampleResult result = resample(views, *rectangle, options, progress);
+  result.field.absolute = response.absolute;
+  result.seconds["loading"] = loading;
+  start = std::chrono::steady_clock::now();
+  write_light_field(output, result.field);
+  result.seconds["writing"] = seconds_since(start);
+  return result;
+}
+
+void add_resample_command(CLI::App& program) {
+  CLI::App* command =
+      program.add_subcommand("resample", "resample a calibrated session into an incident light field (.lf.exr)");
+  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  command->add_option("session", a->session, "session folder with response.json and calibration.json")->required();
+  command->add_option("-o,--output", a->output, "light field to write, NAME.lf.exr")->required();
+  command
+      ->add_option("--height", a->options.height_m, "height of the light-field plane above the world's ground, metres")
+      ->capture_default_str();
+  command->add_option("--directions", a->options.directions, "about how many directions over the hemisphere")
+      ->capture_default_str();
+  command->add_option("--size", a->options.size, "texels along each side of the plane's rectangle")
+      ->capture_default_str();
+  command
+      ->add_option("--proxy", a->options.proxy,
+                   "what the views are focused on: auto, plane, sphere:R (metres), sphere:inf")
+      ->capture_default_str();
+  command->add_option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)")
+      ->capture_default_str();
+  command
+      ->add_option("--rectangle", a->rectangle,
+                   "x0 y0 x1 y1 of the plane's rectangle, world metres (default: where the mirror swept)")
+      ->expected(4);
+  add_json_flag(*command, a->json);
+  command->callback([a] { run(*a); });
+}
+
+}  // namespace mf

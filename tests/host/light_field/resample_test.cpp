@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/resample.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "host/light_field/probe.h"
+#include "host/light_field/view_rays.h"
+#include "tests/host/light_field/synthetic_views.h"
+
+namespace mf {
+namespace {
+
+const PlaneRectangle square{{}, {-0.2, -0.2}, {0.2, 0.2}};
+
+// A smooth distant sky: colours follow the direction.
+Eigen::Vector3f sky(const Eigen::Vector3f&, const Eigen::Vector3f& d) {
+  return {1 + 0.5F * d.x(), 1 + 0.5F * d.y(), 0.5F + d.z() * d.z()};
+}
+
+// A globe of radiance 100 before a dim distant sky.
+struct Globe {
+  Eigen::Vector3f centre{0.3F, 0.2F, 0.9F};
+  float radius = 0.05F;
+  Eigen::Vector3f operator()(const Eigen::Vector3f& o, const Eigen::Vector3f& d) const {
+    const Eigen::Vector3f to = centre - o;
+    const float along = to.dot(d);
+    const bool hit = along > 0 && to.squaredNorm() - along * along < radius * radius;
+    return hit ? Eigen::Vector3f::Constant(100) : Eigen::Vector3f::Constant(0.1F);
+  }
+  // Irradiance of a small globe on the plane at p, without the sky: L · solid angle · cosine.
+  [[nodiscard]] double irradiance(const Eigen::Vector3d& p) const {
+    const Eigen::Vector3d to = centre.cast<double>() - p;
+    const double sine = static_cast<double>(radius) / to.norm();
+    return 100 * M_PI * sine * sine * to.z() / to.norm();
+  }
+};
+
+double irradiance_at(const LightField& field, const Eigen::Vector2f& p) {
+  double sum = 0;
+  for (std::size_t i = 0; i < field.directions.size(); ++i)
+    sum += static_cast<double>(sample_tile(field, i, p).x() * field.directions.directions[i].z() *
+                               field.directions.solid_angles_sr[i]);
+  return sum;
+}
+
+TEST(Resample, DistantSkyComesBack) {
+  const auto views = testing::analytic_views(150, 0.25F, 64, sky);
+  ResampleOptions options;
+  options.directions = 300;
+  options.size = 8;
+  options.proxy = "sphere:inf";
+  const ResampleResult r = resample(views, square, options, {});
+  int seen = 0;
+  for (std::size_t i = 0; i < r.field.directions.size(); ++i) {
+    const Eigen::Vector4f texel = r.field.tile(i)[8 * 3 + 5];
+    if (texel.w() < 0.9F || r.field.directions.directions[i].z() < 0.2F) continue;
+    ++seen;
+    const Eigen::Vector3f expected = sky({}, r.field.directions.directions[i]);
+    EXPECT_LT((texel.head<3>() - expected).norm(), 0.03F * expected.norm()) << i;
+  }
+  EXPECT_GT(seen, 200);
+}
+
+// A lamp smaller than the directions' spacing keeps its energy, whatever their number.
+TEST(Resample, SmallLampKeepsItsEnergy) {
+  const Globe globe;
+  const auto views = testing::analytic_views(400, 0.25F, 96, globe);
+  const double distance = static_cast<double>(globe.centre.norm());
+  for (const int directions : {150, 500, 1500}) {
+    ResampleOptions options;
+    options.directions = directions;
+    options.size = 8;
+    options.proxy = "sphere:" + std::to_string(distance);
+    const ResampleResult r = resample(views, square, options, {});
+    const double sky_part = 0.1 * M_PI;
+    double ours = 0, truth = 0;
+    for (const float x : {-0.12F, 0.0F, 0.12F})
+      for (const float y : {-0.12F, 0.0F, 0.12F}) {
+        ours += irradiance_at(r.field, {x, y}) - sky_part;
+        truth += globe.irradiance({x, y, 0});
+      }
+    EXPECT_NEAR(ours / truth, 1, 0.1) << directions;
+  }
+}
+
+TEST(Resample, PhotoConsistencyFindsTheDistance) {
+  // A textured sphere of 1.4 m about the origin.
+  const testing::Light wall = [](const Eigen::Vector3f& o, const Eigen::Vector3f& d) -> Eigen::Vector3f {
+    const float b = o.dot(d), t = -b + std::sqrt(b * b - o.squaredNorm() + 1.4F * 1.4F);
+    const Eigen::Vector3f x = o + t * d;
+    return Eigen::Vector3f::Constant(1.2F + std::sin(9 * x.x()) * std::cos(8 * x.y()));
+  };
+  const auto scores = score_proxies(testing::analytic_views(200, 0.25F, 64, wall), square, 6);
+  const auto best = std::min_element(scores.begin(), scores.end(), [](const ProxyScore& a, const ProxyScore& b) {
+    return a.inconsistency < b.inconsistency;
+  });
+  EXPECT_DOUBLE_EQ(best->proxy.radius_m, 1.4);
+}
+
+TEST(Resample, NobodyLookedMeansNoConfidence) {
+  std::vector<FieldView> views{testing::analytic_view({0, 0, -0.8F}, {0, 0, 0}, 64, sky)};  // straight up only
+  ResampleOptions options;
+  options.directions = 100;
+  options.size = 4;
+  options.proxy = "sphere:inf";
+  const ResampleResult r = resample(views, square, options, {});
+  for (std::size_t i = 0; i < r.field.directions.size(); ++i) {
+    const bool overhead = r.field.directions.directions[i].z() > 0.97F;
+    if (overhead) {
+      EXPECT_GT(r.field.tile(i)[5].w(), 0.5F);
+    }
+    if (r.field.directions.directions[i].z() < 0.7F) {
+      EXPECT_EQ(r.field.tile(i)[5], Eigen::Vector4f::Zero());
+    }
+  }
+}
+
+TEST(Probe, LooksAlongTheRightDirections) {
+  const auto views = testing::analytic_views(300, 0.25F, 64, sky);
+  ResampleOptions options;
+  options.directions = 600;
+  options.size = 8;
+  options.proxy = "sphere:inf";
+  const ResampleResult r = resample(views, square, options, {});
+  for (const auto convention : {LatLongConvention::blender, LatLongConvention::openexr, LatLongConvention::threejs}) {
+    const Probe probe = make_probe(r.field, {0, 0, 0.1}, convention, 64);
+    for (int y = 0; y < 14; ++y)  // well above the horizon
+      for (int x = 0; x < 64; ++x) {
+        const Eigen::Vector3f d = lat_long_direction(convention, 64, 32, x, y).cast<float>();
+        const Eigen::Vector3f expected = sky({}, d);
+        for (int c = 0; c < 3; ++c) EXPECT_NEAR(probe.radiance.at(x, y, c), expected[c], 0.08F);
+      }
+  }
+}
+
+// The table of facts: what is at the centre, a quarter to the left, and at the top (in the consumer's axes).
+TEST(Probe, ConventionsOfConsumers) {
+  const auto near = [](const Eigen::Vector3d& d, double x, double y, double z) {
+    return (d - Eigen::Vector3d(x, y, z)).norm() < 0.02;
+  };
+  constexpr int w = 1000, h = 500;
+  const auto blender = [&](int x, int y) { return lat_long_direction(LatLongConvention::blender, w, h, x, y); };
+  EXPECT_TRUE(near(blender(500, 250), 0, 1, 0) && near(blender(250, 250), -1, 0, 0) && near(blender(500, 0), 0, 0, 1));
+  // World (x, y, z) is (x, z, −y) in Y-up axes: OpenEXR's +Z at the centre is the world's −y, three.js' +X its +x.
+  const auto openexr = [&](int x, int y) { return lat_long_direction(LatLongConvention::openexr, w, h, x, y); };
+  EXPECT_TRUE(near(openexr(500, 250), 0, -1, 0) && near(openexr(250, 250), 1, 0, 0) && near(openexr(500, 0), 0, 0, 1));
+  const auto threejs = [&](int x, int y) { return lat_long_direction(LatLongConvention::threejs, w, h, x, y); };
+  EXPECT_TRUE(near(threejs(500, 250), 1, 0, 0) && near(threejs(250, 250), 0, 1, 0) && near(threejs(500, 0), 0, 0, 1));
+}
+
+TEST(Proxy, ParsesNames) {
+  EXPECT_EQ(parse_proxy("plane")->radius_m, 0);
+  EXPECT_EQ(parse_proxy("sphere:2.5")->radius_m, 2.5);
+  EXPECT_TRUE(std::isinf(parse_proxy("sphere:inf")->radius_m));
+  for (const char* bad : {"sphere", "sphere:", "sphere:-1", "sphere:0", "sphere:1x", "box", ""})
+    EXPECT_FALSE(parse_proxy(bad)) << bad;
+}
+
+}  // namespace
+}  // namespace mf
