@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/photometry/response_estimate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/check.h"
+#include "common/error.h"
+#include "host/photometry/response_fit.h"
+
+namespace mf {
+
+std::optional<std::string> ResponseOptions::validate() const {
+  if (pixels < 100) return "pixels must be at least 100";
+  if (!(knot_step >= 0.02 && knot_step <= 1)) return "knot_step must lie between 0.02 and 1";
+  if (!(kink_scale > 0)) return "kink_scale must be positive";
+  if (!(outlier_sigmas > 0)) return "outlier_sigmas must be positive";
+  if (max_iterations < 1) return "max_iterations must be at least 1";
+  if (!(noise_limit > 0)) return "noise_limit must be positive";
+  return std::nullopt;
+}
+
+namespace {
+
+struct SweepFacts {
+  DarkReading dark;
+  double saturation = 0;
+  double last_code = 0;
+};
+
+// Where the search for the black level starts, and how far it may go.
+struct BlackPrior {
+  double code = 0, sigma = 0;
+};
+BlackPrior black_prior(const ExposureSweep& sweep, const SweepFacts& facts) {
+  const double near = 4 * facts.dark.noise + 0.005 * facts.last_code;
+  // A frame that is nearly black itself knows better than a data sheet.
+  if (facts.dark.code - facts.dark.extrapolated < 10 * facts.dark.noise) return {facts.dark.extrapolated, near};
+  if (sweep.black_level_hint > 0) return {std::min(sweep.black_level_hint, facts.dark.code), near};
+  return {facts.dark.extrapolated, std::max(near, facts.dark.code)};  // anywhere down to zero
+}
+
+[[noreturn]] void refuse_unseen(const ExposureSweep& sweep, const ChannelSamples& all, const SweepFacts& facts,
+                                int channel) {
+  std::size_t saturated = 0;
+  for (const float code : all.codes) saturated += code >= facts.saturation ? 1 : 0;
+  const bool bright = 2 * saturated > all.codes.size();
+  throw InputError(
+      sweep.source, "sweep",
+      fmt::format("in channel {} {} hardly a pixel is seen clearly, and unsaturated in two frames: add {} exposures",
+                  channel, bright ? "most readings are saturated and" : "the frames are dark and",
+                  bright ? "shorter" : "longer"));
+}
+
+FitProblem problem_for(const ExposureSweep& sweep, const SweepFacts& facts, const ChannelSamples& all, int channel,
+                       const ResponseOptions& options) {
+  const BlackPrior prior = black_prior(sweep, facts);
+  FitProblem problem;
+  const double clear = prior.code + 15 * facts.dark.noise;  // 7 % noise: choosing such readings shifts them little
+  problem.samples = spread_samples(all, static_cast<std::size_t>(options.pixels), clear, facts.saturation);
+  if (problem.samples.pixel_count() < 20) refuse_unseen(sweep, all, facts, channel);
+  problem.black = prior.code;
+  problem.black_sigma = prior.sigma;
+  problem.saturation = facts.saturation;
+  problem.last_code = facts.last_code;
+  problem.dark_noise = facts.dark.noise;
+  return problem;
+}
+
+FitOptions fit_options(const ResponseOptions& options) {
+  FitOptions fit;
+  fit.knot_step = options.knot_step;
+  fit.kink_scale = options.kink_scale;
+  fit.outlier_sigmas = options.outlier_sigmas;
+  fit.max_iterations = options.max_iterations;
+  return fit;
+}
+
+// The channels' black levels as one, when they are one: the weighted mean, if no channel lies further from it than its
+// uncertainty allows or than rounding to codes would show.
+std::optional<double> common_black(const std::vector<ChannelFit>& fits) {
+  double sum = 0, weight = 0;
+  for (const ChannelFit& fit : fits) {
+    const double w = 1 / std::max(1e-12, fit.black_sigma * fit.black_sigma);
+    sum += w * fit.curve.black();
+    weight += w;
+  }
+  const double mean = sum / weight;
+  for (const ChannelFit& fit : fits)
+    if (std::abs(fit.curve.black() - mean) > std::max(0.25, 4 * fit.black_sigma)) return std::nullopt;
+  return mean;
+}
+
+CodeSpline with_black(const CodeSpline& curve, double black) {
+  return {curve.first_u(), curve.step(), black, curve.log_increments()};
+}
+
+// Which codes the sweep's readings speak for: at least three readings within a code of it, not saturated.
+std::vector<bool> observed_codes(const ChannelSamples& all, const SweepFacts& facts) {
+  std::vector<std::size_t> count(static_cast<std::size_t>(facts.last_code) + 1, 0);
+  for (const float code : all.codes)
+    if (code < facts.saturation && code <= facts.last_code) ++count[static_cast<std::size_t>(code)];
+  std::vector<bool> observed(count.size());
+  for (std::size_t m = 0; m < count.size(); ++m) {
+    std::size_t near = 0;
+    for (std::size_t k = m > 0 ? m - 1 : 0; k <= std::min(m + 1, count.size() - 1); ++k) near += count[k];
+    observed[m] = near >= 3;
+  }
+  return observed;
+}
+
+// How ln(exposure) at a code moves with the fit's parameters (q, black).
+Eigen::VectorXd sensitivity(const ChannelFit& fit, double u) {
+  const std::vector<double>& q = fit.curve.log_increments();
+  const auto n = static_cast<Eigen::Index>(q.size());
+  const CodeSpline::Local at = fit.curve.at(u);
+  Eigen::VectorXd row = Eigen::VectorXd::Zero(n + 1);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double per_coefficient = -at.basis[i] / at.slope;
+    for (std::size_t k = 0; k < at.first + i; ++k)
+      row[static_cast<Eigen::Index>(k)] += per_coefficient * std::exp(q[k]);
+    row[0] += per_coefficient * std::exp(q[0]) / std::expm1(fit.curve.step());
+  }
+  row[n] = -1 / at.slope;
+  return row;
+}
+
+ResponseChannel tabulate(const ChannelFit& fit, std::vector<bool> observed, double unit_code) {
+  const std::size_t levels = observed.size();
+  ResponseChannel channel{std::vector<double>(levels, 0.0), std::move(observed), std::vector<double>(levels, 0.0)};
+  const double unit_u = fit.curve.u_of(unit_code);
+  const Eigen::VectorXd unit_row = sensitivity(fit, unit_u);
+  for (std::size_t m = 0; m < levels; ++m) {
+    const double code = static_cast<double>(m);
+    if (code <= fit.curve.black()) continue;
+    const double u = fit.curve.u_of(code);
+    channel.exposure[m] = std::exp(u - unit_u);
+    const Eigen::VectorXd row = sensitivity(fit, u) - unit_row;
+    channel.relative_sigma[m] = std::sqrt(std::max(0.0, row.dot(fit.covariance * row)));
+  }
+  // Rising by construction; rounding may cost an ulp.
+  for (std::size_t m = 1; m < levels; ++m) channel.exposure[m] = std::max(channel.exposure[m], channel.exposure[m - 1]);
+  return channel;
+}
+
+// The code in the middle of what all channels observed: exposure 1.
+double unit_code(const std::vector<std::vector<bool>>& observed, double black, double saturation) {
+  std::vector<std::size_t> codes;
+  for (std::size_t m = 0; m < observed.front().size(); ++m) {
+    const bool inside = static_cast<double>(m) > black + 1 && static_cast<double>(m) < saturation;
+    if (inside && std::all_of(observed.begin(), observed.end(), [m](const auto& o) { return o[m]; }))
+      codes.push_back(m);
+  }
+  return codes.empty() ? (black + saturation) / 2 : static_cast<double>(codes[codes.size() / 2]);
+}
+
+double observed_fraction(const ResponseChannel& channel, double black, double saturation) {
+  std::size_t seen = 0, all = 0;
+  for (std::size_t m = 0; m < channel.observed.size(); ++m) {
+    const double code = static_cast<double>(m);
+    if (code <= black || code >= saturation) continue;
+    ++all;
+    seen += channel.observed[m] ? 1 : 0;
+  }
+  return all > 0 ? static_cast<double>(seen) / static_cast<double>(all) : 0;
+}
+
+class Estimation {
+ public:
+  Estimation(const ExposureSweep& sweep, const ResponseOptions& options, const Progress& progress)
+      : sweep_(sweep), options_(options), progress_(progress), channels_(sweep.format.colour_channels()) {
+    facts_.dark = darkest_reading(sweep);
+    require_rising_codes(sweep, facts_.dark);
+    facts_.saturation = saturation_code(sweep, facts_.dark);
+    facts_.last_code = sweep.format.level_count() - 1;
+  }
+
+  ResponseEstimate run() {
+    fit_all();
+    const std::optional<double> black = common_black(fits_);
+    for (const ChannelFit& fit : fits_) own_.push_back({fit.curve.black(), fit.black_sigma});
+    if (black) share_black(*black);
+    return assemble();
+  }
+
+ private:
+  void step() { report_progress(progress_, "response", ++steps_ / (3.0 * channels_)); }
+
+  void fit_all() {
+    for (int c = 0; c < channels_; ++c) {
+      samples_.push_back(channel_samples(sweep_, c));
+      problems_.push_back(problem_for(sweep_, facts_, samples_.back(), c, options_));
+      const std::optional<CodeSpline> start = rough_curve(problems_.back(), fit_options(options_));
+      if (!start)
+        throw InputError(
+            sweep_.source, "sweep",
+            "the codes do not rise with the exposures given: check exposure_s and nd_density of each frame");
+      fits_.push_back(fit_response(problems_.back(), fit_options(options_), *start));
+      iterations_.push_back(fits_.back().iterations);
+      step();
+    }
+  }
+
+  void share_black(double black) {
+    FitOptions settled = fit_options(options_);
+    settled.first_kink_scale = settled.kink_scale;  // only the black level moves, by a fraction of a code
+    for (std::size_t c = 0; c < fits_.size(); ++c) {
+      problems_[c].black = black;
+      problems_[c].black_sigma = 0;
+      const bool alone = fits_.size() == 1;  // its own estimate is the common one already
+      if (!alone) fits_[c] = fit_response(problems_[c], settled, with_black(fits_[c].curve, black));
+      if (!alone) iterations_[c] += fits_[c].iterations;
+      step();
+    }
+  }
+
+  [[nodiscard]] ResponseEstimate assemble() {
+    ResponseEstimate out;
+    out.curve.black_level = facts_.last_code;
+    double highest_black = 0;
+    std::vector<std::vector<bool>> observed;
+    for (std::size_t c = 0; c < fits_.size(); ++c) {
+      out.curve.black_level = std::min(out.curve.black_level, std::max(0.0, fits_[c].curve.black()));
+      highest_black = std::max(highest_black, fits_[c].curve.black());
+      observed.push_back(observed_codes(samples_[c], facts_));
+    }
+    out.curve.saturation_code = facts_.saturation;
+    out.curve.radiance_scale.assign(fits_.size(), 1.0);
+    const double unit = unit_code(observed, highest_black, facts_.saturation);
+    for (std::size_t c = 0; c < fits_.size(); ++c) out.curve.channels.push_back(tabulate(fits_[c], observed[c], unit));
+    for (std::size_t c = 0; c < fits_.size(); ++c) {
+      const double fraction = observed_fraction(out.curve.channels[c], out.curve.black_level, facts_.saturation);
+      out.channels.push_back({own_[c].code, own_[c].sigma, fraction, iterations_[c], fits_[c].converged,
+                              problems_[c].samples.pixel_count(),
+                              measure_self_consistency(samples_[c], out.curve, static_cast<int>(c), fits_[c].noise,
+                                                       options_.noise_limit)});
+      step();
+    }
+    return out;
+  }
+
+  const ExposureSweep& sweep_;
+  const ResponseOptions& options_;
+  const Progress& progress_;
+  int channels_;
+  SweepFacts facts_;
+  std::vector<ChannelSamples> samples_;  // every pixel, by channel
+  std::vector<FitProblem> problems_;
+  std::vector<ChannelFit> fits_;
+  std::vector<BlackPrior> own_;  // each channel's black level before they were joined
+  std::vector<int> iterations_;
+  int steps_ = 0;
+};
+
+}  // namespace
+
+ResponseEstimate estimate_response(const ExposureSweep& sweep, const ResponseOptions& options,
+                                   const Progress& progress) {
+  if (const std::optional<std::string> wrong = options.validate()) throw InputError("options", "", *wrong);
+  sweep.require_usable();
+  return Estimation(sweep, options, progress).run();
+}
+
+}  // namespace mf
