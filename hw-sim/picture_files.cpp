@@ -51,6 +51,7 @@ bool encode_png16(std::FILE* file, const ImageU16& codes, const png_bytep* rows)
 void write_png16(const std::filesystem::path& path, const ImageU16& codes) {
   check(codes.channels == 1, "a mosaic has one channel");
   std::vector<png_bytep> rows;
+  rows.reserve(static_cast<std::size_t>(codes.height));
   for (int y = 0; y < codes.height; ++y)
     rows.push_back(const_cast<png_bytep>(reinterpret_cast<const png_byte*>(codes.row(y).data())));
   const std::unique_ptr<std::FILE, FileCloser> file(std::fopen(path.c_str(), "wb"));

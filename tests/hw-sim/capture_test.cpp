@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 fs::path fresh_folder(const std::string& name) {
-  const fs::path folder = fs::temp_directory_path() / ("mirrorfield_sim_test_" + name);
+  fs::path folder = fs::temp_directory_path() / ("mirrorfield_sim_test_" + name);
   fs::remove_all(folder);
   return folder;
 }
@@ -111,8 +111,10 @@ TEST(Tracer, LampLightFollowsTheClosedForm) {
 TEST(Sensor, RoundTripsRadianceThroughTheResponse) {
   const Sensor sensor = desk_sensor();
   ImageF radiance(64, 64, 3, 0);
-  for (std::size_t i = 0; i < radiance.data.size(); ++i)  // 0.01 to 400, the same for a Bayer cell
-    radiance.data[i] = 0.01F * std::pow(40000.F, static_cast<float>(i / 3 % 64 / 2) / 31);
+  for (std::size_t i = 0; i < radiance.data.size(); ++i) {
+    const std::size_t cell = i / 3 % 64 / 2;  // a Bayer cell is lit evenly; from 0.01 to 400
+    radiance.data[i] = 0.01F * std::pow(40000.F, static_cast<float>(cell) / 31);
+  }
   const ImageU16 codes = sensor.expose(radiance, 0.01, {0, 0, 64, 64}, 5);
   Frame frame;
   frame.info.exposure_s = 0.01;

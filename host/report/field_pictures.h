@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+
+#include "common/image.h"
+#include "host/light_field/light_field.h"
+
+namespace mf {
+
+// The hemisphere above the plane's middle, seen from below as a disc: azimuthal equal area (Lambert), zenith in the
+// centre, plane +x to the right, +y up; equal areas are equal solid angles. Outside the disc everything is 0.
+struct HemisphereDisc {
+  ImageF radiance;    // three channels: the mean over the plane, weighted by confidence
+  ImageF confidence;  // one channel: the mean over the plane
+};
+[[nodiscard]] HemisphereDisc draw_hemisphere(const LightField&, int size_px);
+
+// E(p) = Σ L(p, ω) (n·ω) ΔΩ(ω) for every texel: three channels, first row at the largest y.
+[[nodiscard]] ImageF irradiance_map(const LightField&);
+
+// Share of the cosine-weighted hemisphere that views looked at, mean over the plane, 0 to 1.
+[[nodiscard]] double covered_share(const LightField&);
+
+// Exposure for to_srgb8() under which all but the brightest 3 % of the lit pixels keep their colour.
+[[nodiscard]] double display_exposure(const ImageF&);
+
+}  // namespace mf
