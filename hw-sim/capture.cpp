@@ -148,7 +148,7 @@ void write_sweep(const fs::path& folder, const Rig& rig) {
   fs::create_directories(folder / "sweep");
   const Eigen::Vector3d p(0.1, 0.03, 0);
   const Rigid3 world_from_mirror = mirror_pose(rig.motion, p, (rig.motion.lamp_in_world - p).normalized(), 0.1);
-  const int samples = 4 * rig.options.samples;  // the same light for all filters: less noise, twelve times used
+  const int samples = 3 * rig.options.samples;  // the same light for all filters: less noise, twelve times used
   const ImageF radiance =
       render(rig.tracer, rig.shot(world_from_mirror, whole(rig.camera), samples, key(rig.options.seed, Stream::sweep)));
   json index = json::array();

@@ -13,11 +13,11 @@
 namespace mf::sim {
 
 struct CaptureOptions {
-  int frames = 140;        // of the waving mirror, ≥ 10
+  int frames = 120;        // of the waving mirror, ≥ 10
   int size = 512;          // edge of a frame in pixels, even, 128 to 2048
   std::uint64_t seed = 1;  // leaves, hand, sampling and sensor noise
-  int samples = 4;         // paths a pixel in frames, ≥ 1: their noise adds to the sensor's
-  int truth_samples = 64;  // paths a pixel in truth pictures, ≥ 1
+  int samples = 5;         // paths a pixel in frames, ≥ 1: their noise adds to the sensor's
+  int truth_samples = 48;  // paths a pixel in truth pictures, ≥ 1
   int views = 1;           // truth pictures with and without the object, 0 to 3
 
   // What is wrong, or nothing.

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double clearance_m = 0.02;
-constexpr double longest_reach_m = 0.25;  // farther from the point the mirror would leave the picture
+constexpr double longest_reach_m = 0.16;  // farther from the point the mirror would leave the picture
 constexpr double table_half_m = 0.17;     // the part of the table that the sweep covers
 constexpr double lowest_z = 0.08;         // of the spiral's directions: below it the table is in the way
 
@@ -80,7 +80,7 @@ std::vector<Rigid3> wave_mirror(const MotionInput& input, int frames, std::uint6
   int i = 0;
   for (const Vector3d& direction : spiral(frames - sweep_count)) {
     // The hand wanders over the table while it turns; the two rates share no period.
-    const Vector3d p(0.08 * std::sin(0.83 * i) + tremor(0.02), 0.08 * std::sin(0.59 * i + 1) + tremor(0.02), 0);
+    const Vector3d p(0.06 * std::sin(0.83 * i) + tremor(0.02), 0.06 * std::sin(0.59 * i + 1) + tremor(0.02), 0);
     poses.push_back(mirror_pose(input, p, direction, tremor(0.06)));
     ++i;
   }

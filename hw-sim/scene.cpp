@@ -113,7 +113,7 @@ Rgb surroundings(const Vector3f& direction) {
   const float elevation = std::asin(std::clamp(direction.z(), -1.0F, 1.0F));
   const float height = 0.5F + 0.5F * direction.z();
   const float beams = 0.75F + 0.25F * std::sin(14 * azimuth) * std::cos(3 * elevation);
-  Rgb light = beams * ((1 - height) * Rgb(0.05F, 0.04F, 0.035F) + height * Rgb(0.16F, 0.17F, 0.2F));
+  Rgb light = beams * ((1 - height) * Rgb(0.1F, 0.08F, 0.07F) + height * Rgb(0.26F, 0.28F, 0.33F));
   struct Window {
     float azimuth, elevation, half_width, half_height;
   };
@@ -147,14 +147,14 @@ MirrorTarget desk_mirror() {
   MirrorTarget target;
   target.family = "tag36h11";
   target.opening_m = {0.34, 0.26};
-  constexpr double size = 0.034;
-  constexpr double x = 0.195;
-  constexpr double y = 0.155;
+  constexpr double size = 0.048;
+  constexpr double x = 0.201;
+  constexpr double y = 0.161;
   int id = 0;
   for (const double row : {y, -y})
-    for (int i = 0; i < 10; ++i) target.tags.push_back({id++, size, {-x + 2 * x * i / 9, row}});
+    for (int i = 0; i <= 6; ++i) target.tags.push_back({id++, size, {-x + 2 * x * i / 6, row}});
   for (const double column : {-x, x})
-    for (int i = 1; i <= 6; ++i) target.tags.push_back({id++, size, {column, -y + 2 * y * i / 7}});
+    for (int i = 1; i <= 4; ++i) target.tags.push_back({id++, size, {column, -y + 2 * y * i / 5}});
   return target;
 }
 

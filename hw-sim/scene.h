@@ -64,7 +64,7 @@ struct Scene {
 // `seed` turns and moves the leaves a little.
 [[nodiscard]] Scene desk_scene(std::uint64_t seed);
 
-// The mirror of the desk: 0.34 × 0.26 m of glass in a frame of 32 tags of 34 mm.
+// The mirror of the desk: 0.34 × 0.26 m of glass in a frame of 22 tags of 48 mm.
 [[nodiscard]] MirrorTarget desk_mirror();
 
 // A trefoil knot, a closed tube of about 0.16 m that floats over the world origin, its lowest point at `clearance_m`.

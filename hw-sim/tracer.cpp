@@ -21,7 +21,7 @@ using Eigen::Vector3f;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float epsilon_m = 1e-4F;  // leaves a surface behind: single precision resolves 1e-7 at a metre
-constexpr int max_diffuse_bounces = 2;
+constexpr int max_diffuse_bounces = 1;
 constexpr int max_mirror_bounces = 4;  // the plate mirrors its own table and back
 constexpr float pi = std::numbers::pi_v<float>;
 

@@ -14,7 +14,7 @@
 namespace mf::sim {
 
 // A path tracer over Embree (Wald et al. 2014): Lambertian surfaces, one globe lamp sampled by its solid angle (Shirley
-// et al. 1996), distant surroundings, and a perfect planar mirror. Light is followed over two diffuse reflections;
+// et al. 1996), distant surroundings, and a perfect planar mirror. Light is followed over two diffuse surfaces;
 // what a mirror throws back onto a surface from the lamp (the caustic) is left out.
 class Tracer {
  public:

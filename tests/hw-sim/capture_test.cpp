@@ -176,7 +176,7 @@ TEST(Capture, TagsAreWhereTruthSaysTheyAre) {
       errors.push_back((camera.project(cam_from_world * x_in_world) - tag.corners_px[k]).norm());
     }
   }
-  EXPECT_GE(mirror_tags, 24);
+  EXPECT_GE(mirror_tags, 18);
   EXPECT_GE(world_tags, 1);
   std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
   EXPECT_LT(errors[errors.size() / 2], 0.3);
