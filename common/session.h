@@ -35,7 +35,15 @@ struct SessionHeader {
 struct SessionFrame {
   std::int64_t id = 0;  // in the order of recording
   FrameInfo info;
-  std::string file;  // below the session's folder
+  std::string file;         // below the session's folder
+  std::int64_t bytes = 0;   // the file's size
+  std::uint32_t crc32 = 0;  // the file's CRC-32, so that damage is never read as light
+};
+
+// A frame as its file holds it: what costs time (compression) is done, what is left is writing.
+struct EncodedFrame {
+  FrameInfo info;
+  std::string tiff;
 };
 
 // A recording on disk: `session.db` (SQLite, WAL) and `frames/NNNNNN.tif` (16-bit TIFF, or 32-bit float for linear
@@ -52,9 +60,13 @@ class SessionWriter {
   SessionWriter(SessionWriter&&) noexcept;
   ~SessionWriter();
 
-  // Precondition: format and size as in the header. Returns the frame's id.
-  std::int64_t append(const Frame&);
-  // Everything durable, the index closed. A session without it is still readable up to its last durable row.
+  // Precondition: format and size as in the header. Safe to call from many threads at once, and beside append().
+  [[nodiscard]] EncodedFrame encode(const Frame&) const;
+  // Returns the frame's id: 0, 1, 2 ... Names are unique in a role.
+  std::int64_t append(const EncodedFrame&);
+  std::int64_t append(const Frame& frame) { return append(encode(frame)); }
+  // Everything durable, the index closed and a single file. A session without it is still readable up to its last
+  // durable row. Nothing may be appended afterwards.
   void finish();
 
  private:
@@ -62,7 +74,7 @@ class SessionWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-// The one reader. Safe to share among threads for read_frame().
+// The one reader; it never writes, and reads beside a running writer. Safe to share among threads for read_frame().
 class SessionReader {
  public:
   // Throws InputError when the folder holds no session or its index is damaged.
@@ -74,7 +86,7 @@ class SessionReader {
   [[nodiscard]] const SessionHeader& header() const;
   [[nodiscard]] const std::vector<SessionFrame>& frames() const;    // all, by id
   [[nodiscard]] std::vector<SessionFrame> frames(FrameRole) const;  // of one role, by id
-  // Throws InputError naming the file when it is missing, truncated or of another size.
+  // Throws InputError naming the file when it is missing, truncated, damaged or of another size.
   [[nodiscard]] Frame read_frame(const SessionFrame&) const;
 
  private:
