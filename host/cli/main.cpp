@@ -19,6 +19,7 @@ int run(int argc, char** argv) {
   program.name("mirrorfield");
   program.require_subcommand(1);
   program.set_version_flag("--version", MIRRORFIELD_VERSION);
+  mf::add_import_command(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
