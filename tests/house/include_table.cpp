@@ -113,6 +113,7 @@ const std::vector<FolderRule>& include_table() {
       // The simulator writes the import format: frames as PNG, truth as EXR, tags as AprilTag draws them.
       {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "CLI11"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
+      {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
       {"host/photometry/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/calibration/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
