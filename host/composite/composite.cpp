@@ -28,9 +28,9 @@ Eigen::Vector4f texel_of_plate(const ImageF& plate, const View& view, const Rigi
     const float* rgb = &plate.data[plate.index(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()))];
     sum += Eigen::Vector4f(rgb[0], rgb[1], rgb[2], 1);
   }
-  return sum.w() > 0 ? Eigen::Vector4f(sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(),
-                                       sum.w() / (points * points))
-                     : Eigen::Vector4f(Eigen::Vector4f::Zero());
+  return sum.w() > 0
+             ? Eigen::Vector4f(sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), sum.w() / (points * points))
+             : Eigen::Vector4f(Eigen::Vector4f::Zero());
 }
 
 // A square picture of colours with weights (w, 0 to 1).
@@ -83,7 +83,9 @@ void fill_unseen(Weighted& picture) {
   push(picture, coarse);
 }
 
-bool changes(float with, float without) { return std::abs(with - without) > 0.01F * without; }
+bool changes(float with, float without) {
+  return std::abs(with - without) > 0.01F * without;
+}
 
 }  // namespace
 

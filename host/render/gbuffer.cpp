@@ -18,7 +18,6 @@ struct Sample {
   bool hit = false;
   std::uint32_t triangle = 0;
   float u = 0, v = 0;
-  float distance = 0;
   SurfacePoint point;
 };
 using PixelSamples = std::array<Sample, samples>;
@@ -76,7 +75,7 @@ class PixelCaster {
     rtcIntersect16(active.data(), scene_->handle(), &context, &rays);
     for (std::size_t i = 0; i < samples; ++i) {
       if (active[i] == 0 || rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-      result[i] = {true, rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i], rays.ray.tfar[i] * directions[i].norm(), {}};
+      result[i] = {true, rays.hit.primID[i], rays.hit.u[i], rays.hit.v[i], {}};
       result[i].point = surface_point(*mesh_, result[i], directions[i]);
     }
     return result;
@@ -86,11 +85,13 @@ class PixelCaster {
     return ground_point(*camera_, plane_from_cam_, {px + 0.5, py + 0.5});
   }
 
-  // Samples of one surface: alike in normal, and no farther apart in depth than a step of the outline would be.
-  [[nodiscard]] bool same_surface(const Sample& a, const Sample& b) const {
+  // Samples of one surface: alike in normal, and the step from one to the other runs along the surface.
+  [[nodiscard]] static bool same_surface(const Sample& a, const Sample& b) {
     constexpr float least_cosine = 0.9F;  // 26°: a crease is two surfaces, a curve within a pixel is one
+    constexpr float steepest = 0.25F;     // the chord of such a curve leaves the tangent by sin 13°
+    const Eigen::Vector3f step = b.point.position - a.point.position;
     return a.point.normal.dot(b.point.normal) > least_cosine &&
-           std::abs(a.distance - b.distance) < 0.02F * scene_->bounds().radius;
+           std::abs(a.point.normal.dot(step)) <= steepest * step.norm();
   }
 
  private:
@@ -131,7 +132,7 @@ void add_pixel(const PixelCaster& caster, int x, int y, std::uint32_t pixel, Til
     if (!all[i].hit) continue;
     members.clear();
     for (std::size_t k = i; k < samples; ++k)
-      if (all[k].hit && caster.same_surface(all[i], all[k])) members.push_back(&all[k]);
+      if (all[k].hit && PixelCaster::same_surface(all[i], all[k])) members.push_back(&all[k]);
     add_fragment(members, pixel, out);
     for (const Sample* s : members) all[static_cast<std::size_t>(s - all.data())].hit = false;
   }

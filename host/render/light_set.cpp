@@ -30,54 +30,18 @@ std::vector<double> cell_power(const LightField& field) {
   return power;
 }
 
-struct Tangents {
-  Eigen::Vector3f u, v;
-};
-Tangents tangents(const Eigen::Vector3f& n) {
-  const Eigen::Vector3f u = n.unitOrthogonal();
-  return {u, n.cross(u)};
-}
-
-// The directions whose cells may touch that of `centre`: all within twice the cells' spacing.
-std::vector<Eigen::Vector3f> neighbours(const DirectionSet& set, std::size_t centre, float radius) {
-  std::vector<Eigen::Vector3f> near;
-  const float least_cosine = std::cos(std::min(6 * radius, 3.F));
-  for (std::size_t i = 0; i < set.size(); ++i)
-    if (i != centre && set.directions[i].dot(set.directions[centre]) > least_cosine) near.push_back(set.directions[i]);
-  return near;
-}
-
-// About `count` points spread evenly over the Voronoi cell of a direction, above the horizon: a sunflower pattern on a
-// disc that is larger than the cell, less what is nearer to another direction. Never empty.
-std::vector<Eigen::Vector3f> points_of_cell(const DirectionSet& set, std::size_t cell, int count) {
-  const Eigen::Vector3f centre = set.directions[cell];
-  const auto [u, v] = tangents(centre);
-  const float radius = std::sqrt(set.solid_angles_sr[cell] / std::numbers::pi_v<float>);
-  const std::vector<Eigen::Vector3f> others = neighbours(set, cell, radius);
-  constexpr float reach = 1.5F;  // of the circle of the same area: holds the corners of five- and six-sided cells
-  const int candidates = static_cast<int>(std::ceil(static_cast<float>(count) * reach * reach));
-  std::vector<Eigen::Vector3f> points;
-  for (int k = 0; k < candidates; ++k) {
-    const float r = reach * radius * std::sqrt((static_cast<float>(k) + 0.5F) / static_cast<float>(candidates));
-    const auto angle = static_cast<float>(k * golden_angle);
-    const Eigen::Vector3f d = (centre + r * (std::cos(angle) * u + std::sin(angle) * v)).normalized();
-    const float own = d.dot(centre);
-    const bool inside = std::none_of(others.begin(), others.end(), [&](const auto& o) { return d.dot(o) > own; });
-    if (inside && d.z() > 1e-3F) points.push_back(d);  // below 0.06° the plane point lies beyond any rectangle
-  }
-  if (points.empty()) points.push_back(centre);
-  return points;
-}
-
-std::vector<int> points_per_cell(const LightField& field, const ImportanceOptions& options) {
+// How often to halve the fan of a cell's triangles (see split_cell), or −1: not at all.
+std::vector<int> splits_per_cell(const LightField& field, const ImportanceOptions& options) {
+  constexpr double fan = 6;  // triangles of a usual cell
   const std::vector<double> power = cell_power(field);
   const double total = std::accumulate(power.begin(), power.end(), 0.);
-  std::vector<int> counts(power.size(), 1);
-  if (!(total > 0)) return counts;
-  for (std::size_t i = 0; i < power.size(); ++i)
-    counts[i] = std::clamp(static_cast<int>(std::lround(options.extra_directions * power[i] / total)), 1,
-                           options.most_per_cell);
-  return counts;
+  std::vector<int> splits(power.size(), -1);
+  if (!(total > 0)) return splits;
+  for (std::size_t i = 0; i < power.size(); ++i) {
+    const double parts = std::min<double>(options.extra_directions * power[i] / total, options.most_per_cell);
+    if (parts >= 2) splits[i] = std::max(0, static_cast<int>(std::lround(std::log2(parts / fan))));
+  }
+  return splits;
 }
 
 }  // namespace
@@ -93,17 +57,16 @@ LightSet make_light_set(const LightField& field, const ImportanceOptions& option
   LightSet set;
   const Eigen::Vector2f min = field.plane.min_m.cast<float>();
   const Eigen::Vector2f max = field.plane.max_m.cast<float>();
-  const std::vector<int> counts = points_per_cell(field, options);
+  const std::vector<int> splits = splits_per_cell(field, options);
   for (std::size_t i = 0; i < field.directions.size(); ++i) {
+    const auto image = static_cast<std::uint32_t>(i);
     set.images.push_back({min, max, field.resolution, field.resolution, field.tile(i)});
-    const float solid_angle = field.directions.solid_angles_sr[i];
-    if (counts[i] == 1) {
-      set.lights.push_back({field.directions.directions[i], solid_angle, static_cast<std::uint32_t>(i)});
+    if (splits[i] < 0) {
+      set.lights.push_back({field.directions.directions[i], field.directions.solid_angles_sr[i], image});
       continue;
     }
-    const std::vector<Eigen::Vector3f> points = points_of_cell(field.directions, i, counts[i]);
-    for (const Eigen::Vector3f& d : points)
-      set.lights.push_back({d, solid_angle / static_cast<float>(points.size()), static_cast<std::uint32_t>(i)});
+    for (const CellSample& part : split_cell(field.directions, i, splits[i]))
+      set.lights.push_back({part.direction, part.solid_angle_sr, image});
   }
   return set;
 }
