@@ -22,6 +22,7 @@ int run(int argc, char** argv) {
   mf::add_import_command(program);
   mf::add_render_command(program);
   mf::add_composite_command(program);
+  mf::add_probe_command(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -59,11 +59,7 @@ std::string summary(const ReportInput& in) {
       tile(fmt::format("{:.0f} %", 100 * covered_share(in.field)), "of the light's directions seen (cosine-weighted)");
   tiles += tile(fmt::format("{} × {}²", in.field.directions.size(), in.field.resolution), "directions × texels");
   tiles += tile(fmt::format("{:.2f} × {:.2f} m", size.x(), size.y()), "plane");
-  const double radius = in.field.proxy.radius_m;
-  tiles += tile(radius == 0          ? "the plane"
-                : std::isinf(radius) ? "infinity"
-                                     : fmt::format("{:.2f} m", radius),
-                "focused on surroundings at");
+  tiles += tile(surroundings_name(in.field.surroundings), "focused on");
   tiles += tile(in.response.absolute ? "absolute" : "relative", "radiance scale");
   return "<div class=\"tiles\">" + tiles + "</div>\n";
 }
