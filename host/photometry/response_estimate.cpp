@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "common/check.h"
 #include "common/error.h"
@@ -30,11 +33,11 @@ struct SweepFacts {
   double last_code = 0;
 };
 
-// Where the search for the black level starts, and how far it may go.
-struct BlackPrior {
+// A black level and its standard deviation: before a fit where the search starts and how far it may go.
+struct BlackLevel {
   double code = 0, sigma = 0;
 };
-BlackPrior black_prior(const ExposureSweep& sweep, const SweepFacts& facts) {
+BlackLevel black_prior(const ExposureSweep& sweep, const SweepFacts& facts) {
   const double near = 4 * facts.dark.noise + 0.005 * facts.last_code;
   // A frame that is nearly black itself knows better than a data sheet.
   if (facts.dark.code - facts.dark.extrapolated < 10 * facts.dark.noise) return {facts.dark.extrapolated, near};
@@ -56,7 +59,7 @@ BlackPrior black_prior(const ExposureSweep& sweep, const SweepFacts& facts) {
 
 FitProblem problem_for(const ExposureSweep& sweep, const SweepFacts& facts, const ChannelSamples& all, int channel,
                        const ResponseOptions& options) {
-  const BlackPrior prior = black_prior(sweep, facts);
+  const BlackLevel prior = black_prior(sweep, facts);
   FitProblem problem;
   const double clear = prior.code + 15 * facts.dark.noise;  // 7 % noise: choosing such readings shifts them little
   problem.samples = spread_samples(all, static_cast<std::size_t>(options.pixels), clear, facts.saturation);
@@ -80,17 +83,17 @@ FitOptions fit_options(const ResponseOptions& options) {
 
 // The channels' black levels as one, when they are one: the weighted mean, if no channel lies further from it than its
 // uncertainty allows or than rounding to codes would show.
-std::optional<double> common_black(const std::vector<ChannelFit>& fits) {
+std::optional<BlackLevel> common_black(const std::vector<BlackLevel>& own) {
   double sum = 0, weight = 0;
-  for (const ChannelFit& fit : fits) {
-    const double w = 1 / std::max(1e-12, fit.black_sigma * fit.black_sigma);
-    sum += w * fit.curve.black();
+  for (const BlackLevel& black : own) {
+    const double w = 1 / std::max(1e-12, black.sigma * black.sigma);
+    sum += w * black.code;
     weight += w;
   }
   const double mean = sum / weight;
-  for (const ChannelFit& fit : fits)
-    if (std::abs(fit.curve.black() - mean) > std::max(0.25, 4 * fit.black_sigma)) return std::nullopt;
-  return mean;
+  for (const BlackLevel& black : own)
+    if (std::abs(black.code - mean) > std::max(0.25, 4 * black.sigma)) return std::nullopt;
+  return BlackLevel{mean, 1 / std::sqrt(weight)};
 }
 
 CodeSpline with_black(const CodeSpline& curve, double black) {
@@ -170,7 +173,14 @@ double observed_fraction(const ResponseChannel& channel, double black, double sa
 class Estimation {
  public:
   Estimation(const ExposureSweep& sweep, const ResponseOptions& options, const Progress& progress)
-      : sweep_(sweep), options_(options), progress_(progress), channels_(sweep.format.colour_channels()) {
+      : sweep_(sweep),
+        options_(options),
+        progress_(progress),
+        channels_(sweep.format.colour_channels()),
+        samples_(static_cast<std::size_t>(channels_)),
+        problems_(samples_.size()),
+        fits_(samples_.size()),
+        iterations_(samples_.size()) {
     facts_.dark = darkest_reading(sweep);
     require_rising_codes(sweep, facts_.dark);
     facts_.saturation = saturation_code(sweep, facts_.dark);
@@ -179,41 +189,48 @@ class Estimation {
 
   ResponseEstimate run() {
     fit_all();
-    const std::optional<double> black = common_black(fits_);
-    for (const ChannelFit& fit : fits_) own_.push_back({fit.curve.black(), fit.black_sigma});
+    for (const std::optional<ChannelFit>& fit : fits_) own_.push_back({fit->curve.black(), fit->black_sigma});
+    const std::optional<BlackLevel> black = common_black(own_);
     if (black) share_black(*black);
     return assemble();
   }
 
  private:
-  void step() { report_progress(progress_, "response", ++steps_ / (3.0 * channels_)); }
+  // Channels are independent: one task each. Progress is called by one of them at a time.
+  template <typename Work>
+  void each_channel(const Work& work) {
+    tbb::parallel_for(0, channels_, [&](int c) {
+      work(static_cast<std::size_t>(c));
+      const std::lock_guard lock(progress_mutex_);
+      report_progress(progress_, "response", ++steps_ / (3.0 * channels_));
+    });
+  }
 
   void fit_all() {
-    for (int c = 0; c < channels_; ++c) {
-      samples_.push_back(channel_samples(sweep_, c));
-      problems_.push_back(problem_for(sweep_, facts_, samples_.back(), c, options_));
-      const std::optional<CodeSpline> start = rough_curve(problems_.back(), fit_options(options_));
+    each_channel([&](std::size_t c) {
+      samples_[c] = channel_samples(sweep_, static_cast<int>(c));
+      problems_[c] = problem_for(sweep_, facts_, samples_[c], static_cast<int>(c), options_);
+      const std::optional<CodeSpline> start = rough_curve(problems_[c], fit_options(options_));
       if (!start)
         throw InputError(
             sweep_.source, "sweep",
             "the codes do not rise with the exposures given: check exposure_s and nd_density of each frame");
-      fits_.push_back(fit_response(problems_.back(), fit_options(options_), *start));
-      iterations_.push_back(fits_.back().iterations);
-      step();
-    }
+      fits_[c] = fit_response(problems_[c], fit_options(options_), *start);
+      iterations_[c] = fits_[c]->iterations;
+    });
   }
 
-  void share_black(double black) {
+  void share_black(const BlackLevel& black) {
     FitOptions settled = fit_options(options_);
     settled.first_kink_scale = settled.kink_scale;  // only the black level moves, by a fraction of a code
-    for (std::size_t c = 0; c < fits_.size(); ++c) {
-      problems_[c].black = black;
+    each_channel([&](std::size_t c) {
+      if (fits_.size() == 1) return;  // its own estimate is the common one already
+      problems_[c].black = black.code;
       problems_[c].black_sigma = 0;
-      const bool alone = fits_.size() == 1;  // its own estimate is the common one already
-      if (!alone) fits_[c] = fit_response(problems_[c], settled, with_black(fits_[c].curve, black));
-      if (!alone) iterations_[c] += fits_[c].iterations;
-      step();
-    }
+      fits_[c] = fit_response(problems_[c], settled, with_black(fits_[c]->curve, black.code));
+      fits_[c]->covariance.bottomRightCorner<1, 1>().setConstant(black.sigma * black.sigma);
+      iterations_[c] += fits_[c]->iterations;
+    });
   }
 
   [[nodiscard]] ResponseEstimate assemble() {
@@ -222,23 +239,27 @@ class Estimation {
     double highest_black = 0;
     std::vector<std::vector<bool>> observed;
     for (std::size_t c = 0; c < fits_.size(); ++c) {
-      out.curve.black_level = std::min(out.curve.black_level, std::max(0.0, fits_[c].curve.black()));
-      highest_black = std::max(highest_black, fits_[c].curve.black());
+      out.curve.black_level = std::min(out.curve.black_level, std::max(0.0, fits_[c]->curve.black()));
+      highest_black = std::max(highest_black, fits_[c]->curve.black());
       observed.push_back(observed_codes(samples_[c], facts_));
     }
     out.curve.saturation_code = facts_.saturation;
     out.curve.radiance_scale.assign(fits_.size(), 1.0);
     const double unit = unit_code(observed, highest_black, facts_.saturation);
-    for (std::size_t c = 0; c < fits_.size(); ++c) out.curve.channels.push_back(tabulate(fits_[c], observed[c], unit));
-    for (std::size_t c = 0; c < fits_.size(); ++c) {
-      const double fraction = observed_fraction(out.curve.channels[c], out.curve.black_level, facts_.saturation);
-      out.channels.push_back({own_[c].code, own_[c].sigma, fraction, iterations_[c], fits_[c].converged,
-                              problems_[c].samples.pixel_count(),
-                              measure_self_consistency(samples_[c], out.curve, static_cast<int>(c), fits_[c].noise,
-                                                       options_.noise_limit)});
-      step();
-    }
+    for (std::size_t c = 0; c < fits_.size(); ++c) out.curve.channels.push_back(tabulate(*fits_[c], observed[c], unit));
+    out.channels.resize(fits_.size());
+    each_channel([&](std::size_t c) { out.channels[c] = report(out.curve, c); });
     return out;
+  }
+
+  [[nodiscard]] ChannelReport report(const ResponseCurve& curve, std::size_t c) const {
+    return {own_[c].code,
+            own_[c].sigma,
+            observed_fraction(curve.channels[c], curve.black_level, facts_.saturation),
+            iterations_[c],
+            fits_[c]->converged,
+            problems_[c].samples.pixel_count(),
+            measure_self_consistency(samples_[c], curve, static_cast<int>(c), fits_[c]->noise, options_.noise_limit)};
   }
 
   const ExposureSweep& sweep_;
@@ -248,9 +269,10 @@ class Estimation {
   SweepFacts facts_;
   std::vector<ChannelSamples> samples_;  // every pixel, by channel
   std::vector<FitProblem> problems_;
-  std::vector<ChannelFit> fits_;
-  std::vector<BlackPrior> own_;  // each channel's black level before they were joined
+  std::vector<std::optional<ChannelFit>> fits_;  // all there after fit_all()
+  std::vector<BlackLevel> own_;                  // each channel's black level before they were joined
   std::vector<int> iterations_;
+  std::mutex progress_mutex_;
   int steps_ = 0;
 };
 

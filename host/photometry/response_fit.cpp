@@ -175,7 +175,7 @@ class Fit {
         const auto first = static_cast<Eigen::Index>(r.at.first);
         const Eigen::Map<const Eigen::Vector4d> basis(r.at.basis.data());
         normal.matrix.block<4, 4>(first, first).noalias() += r.weight * basis * basis.transpose();
-        normal.matrix.block<4, 1>(first, black) += r.weight * basis;
+        normal.matrix.block<1, 4>(black, first) += r.weight * basis.transpose();
         normal.matrix(black, black) += r.weight;
         normal.right.segment<4>(first) += r.weight * r.residual * basis;
         normal.right[black] += r.weight * r.residual;
@@ -188,15 +188,17 @@ class Fit {
       if (curvature <= 0) return;
       const auto start = static_cast<Eigen::Index>(low), length = static_cast<Eigen::Index>(high - low);
       const auto part = coupling.segment(start, length);
-      normal.matrix.block(start, start, length, length).noalias() -= part * (part / curvature).transpose();
-      normal.matrix.block(start, black, length, 1).noalias() -= part * (coupling[black] / curvature);
+      normal.matrix.block(start, start, length, length)
+          .selfadjointView<Eigen::Lower>()
+          .rankUpdate(part, -1 / curvature);
+      normal.matrix.block(black, start, 1, length).noalias() -= (coupling[black] / curvature) * part.transpose();
       normal.matrix(black, black) -= coupling[black] * coupling[black] / curvature;
       normal.right.segment(start, length) -= part * (gradient / curvature);
       normal.right[black] -= coupling[black] * gradient / curvature;
       coupling.segment(start, length).setZero();
       coupling[black] = 0;
     });
-    normal.matrix.row(black) = normal.matrix.col(black).transpose();
+    normal.matrix.triangularView<Eigen::StrictlyUpper>() = normal.matrix.transpose();  // only the lower half was summed
     return normal;
   }
 

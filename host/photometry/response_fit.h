@@ -40,7 +40,7 @@ struct ChannelFit {
   CodeSpline curve;
   double black_sigma = 0;  // of curve.black(), a posteriori
   CodeNoise noise;
-  Eigen::MatrixXd covariance;  // of (log_increments, black)
+  Eigen::MatrixXd covariance;  // of (log_increments, black); black's part means nothing when it was known
   int iterations = 0;
   bool converged = false;
 };

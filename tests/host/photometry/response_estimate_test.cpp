@@ -103,6 +103,34 @@ TEST(EstimateResponse, ChannelsShareTheBlackLevelAndTheScale) {
                 1, 0.02);
 }
 
+TEST(EstimateResponse, TheUncertaintyIsThatOfTheError) {
+  // Over sweeps that differ in noise alone, errors scatter as relative_sigma says; where nothing was seen, code 4000,
+  // it may be larger: the prior allows for stranger sensors than this one.
+  constexpr unsigned runs = 8;
+  const std::vector<std::size_t> codes{74, 100, 300, 700, 1500, 3000, 4000};
+  std::vector<double> square(codes.size(), 0), expected(codes.size(), 0);
+  for (unsigned seed = 1; seed <= runs; ++seed) {
+    SimulatedSweep sweep = linlog();
+    sweep.size = 64;
+    sweep.seed = seed;
+    const ResponseChannel channel = estimate_response(sweep.frames(), quick()).curve.channels[0];
+    // exposure is 1 at the code where the estimate is anchored; its uncertainty is relative to that code
+    const auto unit = static_cast<std::size_t>(std::lower_bound(channel.exposure.begin(), channel.exposure.end(), 1.0) -
+                                               channel.exposure.begin());
+    for (std::size_t k = 0; k < codes.size(); ++k) {
+      const std::vector<double>& truth = sweep.truth.channels[0].exposure;
+      square[k] += std::pow(std::log(channel.exposure[codes[k]] / (truth[codes[k]] / truth[unit])), 2) / runs;
+      expected[k] += std::pow(channel.relative_sigma[codes[k]], 2) / runs;
+    }
+  }
+  for (std::size_t k = 0; k < codes.size(); ++k) {
+    EXPECT_LT(std::sqrt(square[k] / expected[k]), 2) << codes[k];
+    if (codes[k] < 3500) {
+      EXPECT_GT(std::sqrt(square[k] / expected[k]), 0.4) << codes[k];
+    }
+  }
+}
+
 TEST(EstimateResponse, SelfConsistencyIsTheNoiseAndNothingElse) {
   const ResponseEstimate estimate = estimate_response(linlog().frames(), quick());
   const SelfConsistency& c = estimate.channels[0].consistency;
