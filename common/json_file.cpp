@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "common/json_file.h"
 
-#include <fstream>
-
 #include "common/atomic_file.h"
 #include "common/error.h"
+#include "common/file_bytes.h"
+#include "common/json_fault.h"
 
 namespace mf {
 
 nlohmann::json read_json_file(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw InputError(file.string(), "", "cannot be opened: check that it exists and is readable");
-  try {
-    return nlohmann::json::parse(in);
-  } catch (const nlohmann::json::exception& e) {
-    throw InputError(file.string(), "", std::string("is no valid JSON: ") + e.what());
-  }
+  const std::string text = read_file_bytes(file);
+  if (const std::optional<JsonFault> fault = find_json_fault(text))
+    throw InputError(file.string(), fault->field, fault->problem);
+  return nlohmann::json::parse(text);
 }
 
 void write_json_file(const std::filesystem::path& file, const nlohmann::json& json) {

@@ -10,7 +10,7 @@
 
 namespace mf {
 
-// Throws InputError naming the file when it is missing or is no JSON (with the position of the fault).
+// Throws InputError naming the file when it is missing or is no JSON (with the value, line and column at fault).
 [[nodiscard]] nlohmann::json read_json_file(const std::filesystem::path& file);
 
 // Written aside and renamed, indented by one.

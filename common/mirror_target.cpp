@@ -66,6 +66,19 @@ void require_disjoint(const MirrorTarget& target, const std::string& file) {
   }
 }
 
+void require_disjoint(const WorldTarget& world, const std::string& file) {
+  constexpr double same_height_m = 0.01;  // tags on a shelf above others overlap in x and y, and may
+  for (std::size_t i = 0; i < world.tags.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const WorldTag& tag = world.tags[i];
+      const WorldTag& other = world.tags[j];
+      if (std::abs(tag.centre_in_world.z() - other.centre_in_world.z()) < same_height_m &&
+          squares_overlap(tag.centre_in_world.head<2>(), tag.size_m, other.centre_in_world.head<2>(), other.size_m))
+        throw InputError(file, fmt::format("tags[{}]", i),
+                         fmt::format("tags {} and {} overlap: check centre_in_world_m and size_m", other.id, tag.id));
+    }
+}
+
 }  // namespace
 
 bool is_known_tag_family(const std::string& family) {
@@ -118,6 +131,7 @@ WorldTarget world_target_from_json(const nlohmann::json& json, const std::string
         {id, positive_from_json(tag, "size_m", file), vector_from_json<3>(tag, "centre_in_world_m", file)});
   }
   if (world.tags.empty()) throw InputError(file, "tags", "is empty: list the tags that define the world frame");
+  require_disjoint(world, file);
   if (json.contains("checkerboard")) {
     const nlohmann::json& board = json.at("checkerboard");
     const Eigen::Vector2d squares = vector_from_json<2>(board, "squares", file);

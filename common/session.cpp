@@ -229,7 +229,11 @@ SessionReader::SessionReader(fs::path folder) : impl_(std::make_unique<Impl>()) 
   impl_->folder = std::move(folder);
   const fs::path index_path = index_file(impl_->folder);
   std::error_code error;
-  if (!fs::is_regular_file(index_path, error))
+  const bool found = fs::is_regular_file(index_path, error);
+  if (error && error != std::errc::no_such_file_or_directory && error != std::errc::not_a_directory)
+    throw InputError(index_path.string(), "",
+                     fmt::format("cannot be opened ({}): check its permissions", error.message()));
+  if (!found)
     throw InputError(impl_->folder.string(), "",
                      "is no session (it holds no session.db): give a folder that import or the recorder made");
   const SqliteDatabase index(index_path, SqliteDatabase::Mode::read_only);
