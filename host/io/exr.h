@@ -15,9 +15,9 @@ namespace mf {
 [[nodiscard]] ImageF read_exr(const std::filesystem::path&);
 
 struct ExrOptions {
-  bool half = true;                               // 16-bit float channels; else 32-bit
-  bool latlong = false;                           // sets the envmap attribute
-  std::map<std::string, std::string> attributes;  // string attributes, by name
+  bool half = true;                                 // 16-bit float channels; else 32-bit
+  bool latlong = false;                             // sets the envmap attribute
+  std::map<std::string, std::string> attributes{};  // string attributes, by name
 };
 
 // Channels: 1 (Y), 3 (R, G, B) or 4 (R, G, B, A). ZIP; `chromaticities` are BT.709. Written aside and renamed.

@@ -4,10 +4,9 @@
 #include <gtest/gtest.h>
 #include <tiffio.h>
 
-#include <fstream>
-
 #include "common/file_bytes.h"
 #include "tests/support/expect_input_error.h"
+#include "tests/support/foreign_png.h"
 #include "tests/support/pictures.h"
 #include "tests/support/run_command.h"
 #include "tests/support/temporary_folder.h"
@@ -20,10 +19,7 @@ using test::input_error_of;
 using test::random_codes;
 using test::random_radiances;
 using test::same_pixels;
-
-void write_bytes(const std::filesystem::path& file, const std::string& bytes) {
-  std::ofstream(file, std::ios::binary) << bytes;
-}
+using test::write_bytes;
 
 TEST(Tiff, RoundTripsEveryKindBitForBit) {
   const std::vector<FramePixels> pictures{random_codes(33, 17, 1, 16), random_codes(33, 17, 3, 16),
