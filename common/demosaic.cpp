@@ -25,11 +25,9 @@ ImageF padded(const ImageF& image) {
     const std::span<const float> from = image.row(mirrored(y - reach, image.height));
     const std::span<float> to = out.row(y);
     std::copy(from.begin(), from.end(), to.begin() + reach);
-    for (int i = 0; i < reach; ++i) {
-      to[static_cast<std::size_t>(i)] = from[static_cast<std::size_t>(mirrored(i - reach, image.width))];
-      to[static_cast<std::size_t>(reach + image.width + i)] =
-          from[static_cast<std::size_t>(mirrored(image.width + i, image.width))];
-    }
+    for (int x = -reach; x < 0; ++x) out.at(x + reach, y) = from[static_cast<std::size_t>(mirrored(x, image.width))];
+    for (int x = image.width; x < image.width + reach; ++x)
+      out.at(x + reach, y) = from[static_cast<std::size_t>(mirrored(x, image.width))];
   }
   return out;
 }

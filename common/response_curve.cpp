@@ -118,6 +118,7 @@ void look_up_row(std::span<const std::uint16_t> codes, std::span<const std::vect
 
 ImageF look_up(const ImageU16& codes, const PixelFormat& format, const ResponseCurve& curve, double exposure_s) {
   std::vector<std::vector<float>> by_colour;
+  by_colour.reserve(static_cast<std::size_t>(format.colour_channels()));
   for (int c = 0; c < format.colour_channels(); ++c) by_colour.push_back(radiance_table(curve, c, exposure_s));
   ImageF radiance(codes.width, codes.height, codes.channels);
   for (int y = 0; y < codes.height; ++y) {

@@ -114,34 +114,40 @@ std::vector<bool> observed_codes(const ChannelSamples& all, const SweepFacts& fa
   return observed;
 }
 
-// How ln(exposure) at a code moves with the fit's parameters (q, black).
-Eigen::VectorXd sensitivity(const ChannelFit& fit, double u) {
-  const std::vector<double>& q = fit.curve.log_increments();
-  const auto n = static_cast<Eigen::Index>(q.size());
-  const CodeSpline::Local at = fit.curve.at(u);
-  Eigen::VectorXd row = Eigen::VectorXd::Zero(n + 1);
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double per_coefficient = -at.basis[i] / at.slope;
-    for (std::size_t k = 0; k < at.first + i; ++k)
-      row[static_cast<Eigen::Index>(k)] += per_coefficient * std::exp(q[k]);
-    row[0] += per_coefficient * std::exp(q[0]) / std::expm1(fit.curve.step());
-  }
-  row[n] = -1 / at.slope;
-  return row;
+// How ln(exposure) at a code moves with the four coefficients that matter there, and with the black level.
+struct Sensitivity {
+  Eigen::Index first;
+  Eigen::Vector4d coefficients;
+  double black;
+};
+Sensitivity sensitivity(const CodeSpline& curve, double u) {
+  const CodeSpline::Local at = curve.at(u);
+  return {static_cast<Eigen::Index>(at.first), Eigen::Map<const Eigen::Vector4d>(at.basis.data()) / -at.slope,
+          -1 / at.slope};
+}
+
+double covariance_of(const Sensitivity& a, const Sensitivity& b, const Eigen::MatrixXd& c) {
+  const Eigen::Index black = c.rows() - 1;
+  return a.coefficients.dot(c.block<4, 4>(a.first, b.first) * b.coefficients) +
+         a.black * c.block<1, 4>(black, b.first).dot(b.coefficients.transpose()) +
+         b.black * c.block<4, 1>(a.first, black).dot(a.coefficients) + a.black * b.black * c(black, black);
 }
 
 ResponseChannel tabulate(const ChannelFit& fit, std::vector<bool> observed, double unit_code) {
   const std::size_t levels = observed.size();
   ResponseChannel channel{std::vector<double>(levels, 0.0), std::move(observed), std::vector<double>(levels, 0.0)};
   const double unit_u = fit.curve.u_of(unit_code);
-  const Eigen::VectorXd unit_row = sensitivity(fit, unit_u);
+  const Sensitivity unit = sensitivity(fit.curve, unit_u);
+  const double unit_variance = covariance_of(unit, unit, fit.covariance);
   for (std::size_t m = 0; m < levels; ++m) {
     const double code = static_cast<double>(m);
     if (code <= fit.curve.black()) continue;
     const double u = fit.curve.u_of(code);
     channel.exposure[m] = std::exp(u - unit_u);
-    const Eigen::VectorXd row = sensitivity(fit, u) - unit_row;
-    channel.relative_sigma[m] = std::sqrt(std::max(0.0, row.dot(fit.covariance * row)));
+    const Sensitivity here = sensitivity(fit.curve, u);
+    const double variance =
+        covariance_of(here, here, fit.covariance) + unit_variance - 2 * covariance_of(here, unit, fit.covariance);
+    channel.relative_sigma[m] = std::sqrt(std::max(0.0, variance));
   }
   // Rising by construction; rounding may cost an ulp.
   for (std::size_t m = 1; m < levels; ++m) channel.exposure[m] = std::max(channel.exposure[m], channel.exposure[m - 1]);

@@ -202,16 +202,26 @@ class Fit {
     return normal;
   }
 
-  // d(a, black) / d(q, black)
-  [[nodiscard]] Matrix coefficients_from_increments() const {
+  // d(a, black)/d(q, black) = T has equal columns below a diagonal: products with it are sums. This is Tᵀ · m.
+  [[nodiscard]] Matrix over_increments(const Matrix& m) const {
     const std::vector<double>& q = curve_.log_increments();
     const auto n = static_cast<Eigen::Index>(q.size());
-    Matrix t = Matrix::Zero(n + 2, n + 1);
-    for (Eigen::Index i = 0; i < n; ++i)
-      t.col(i).segment(i + 1, n - i).setConstant(std::exp(q[static_cast<std::size_t>(i)]));
-    t.col(0).head(n + 1).array() += std::exp(q[0]) / std::expm1(curve_.step());
-    t(n + 1, n) = 1;
-    return t;
+    Matrix out(n + 1, m.cols());
+    out.row(n) = m.row(n + 1);  // black
+    Eigen::RowVectorXd later = Eigen::RowVectorXd::Zero(m.cols());
+    for (Eigen::Index i = n - 1; i >= 0; --i) {
+      later += m.row(i + 1);
+      out.row(i) = std::exp(q[static_cast<std::size_t>(i)]) * later;
+    }
+    out.row(0) += std::exp(q[0]) / std::expm1(curve_.step()) * (later + m.row(0));
+    return out;
+  }
+
+  // T · m · Tᵀ, the covariance of (a, black) from that of (q, black).
+  [[nodiscard]] Matrix over_coefficients(const Matrix& m) const {
+    const Eigen::Index size = m.rows() + 1;
+    const Matrix t = over_increments(Matrix::Identity(size, size)).transpose();
+    return t * m * t.transpose();
   }
 
   // Second differences of q; before the first knot the toe's line goes on.
@@ -258,10 +268,8 @@ class Fit {
   }
 
   [[nodiscard]] Normal normal_equations() const {
-    const Normal over_coefficients = data_normal();
-    const Matrix t = coefficients_from_increments();
-    Normal normal{t.transpose() * over_coefficients.matrix * t, t.transpose() * over_coefficients.right,
-                  over_coefficients.cost};
+    const Normal data = data_normal();
+    Normal normal{over_increments(over_increments(data.matrix).transpose()), over_increments(data.right), data.cost};
     add_prior(normal);
     return normal;
   }
@@ -307,8 +315,9 @@ class Fit {
     Normal normal = normal_equations();
     normal.matrix.diagonal().array() += 1e-9 * normal.matrix.diagonal().mean();  // the scale is free
     const Eigen::Index size = normal.right.size();
-    ChannelFit fit{curve_, 0, noise_, normal.matrix.ldlt().solve(Matrix::Identity(size, size)), iterations, converged};
-    if (problem_.black_sigma > 0) fit.black_sigma = std::sqrt(std::max(0.0, fit.covariance(size - 1, size - 1)));
+    const Matrix covariance = normal.matrix.ldlt().solve(Matrix::Identity(size, size));
+    ChannelFit fit{curve_, 0, noise_, over_coefficients(covariance), iterations, converged};
+    if (problem_.black_sigma > 0) fit.black_sigma = std::sqrt(std::max(0.0, covariance(size - 1, size - 1)));
     return fit;
   }
 

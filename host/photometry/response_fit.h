@@ -40,7 +40,8 @@ struct ChannelFit {
   CodeSpline curve;
   double black_sigma = 0;  // of curve.black(), a posteriori
   CodeNoise noise;
-  Eigen::MatrixXd covariance;  // of (log_increments, black); black's part means nothing when it was known
+  // Of the curve's coefficients and, last, the black level. When black was known that entry means nothing.
+  Eigen::MatrixXd covariance;
   int iterations = 0;
   bool converged = false;
 };

@@ -33,8 +33,7 @@ constexpr std::size_t code_ranges = 24;
 class Measure {
  public:
   Measure(const ChannelSamples& all, const ResponseCurve& curve, int channel, const CodeNoise& noise, double limit)
-      : all_(all),
-        curve_(curve),
+      : curve_(curve),
         channel_(channel),
         limit_(limit),
         noise_(relative_noise(curve, channel, noise)),
@@ -131,7 +130,6 @@ class Measure {
     ++cell.count;
   }
 
-  const ChannelSamples& all_;
   const ResponseCurve& curve_;
   int channel_;
   double limit_;
