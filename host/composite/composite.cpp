@@ -90,7 +90,7 @@ bool changes(float with, float without) {
 }  // namespace
 
 GroundRadiance plate_on_ground(const ImageF& plate, const View& view, const PlaneRectangle& plane,
-                               const BoundingSphere& object_in_plane) {
+                               const Bounds& object_in_plane) {
   constexpr int texels_a_side = 256;  // 4 % of the object's radius each
   GroundRadiance ground = ground_around(object_in_plane, texels_a_side);
   const Rigid3 cam_from_plane = view.cam_from_world * plane.world_from_plane;
@@ -110,7 +110,7 @@ CompositeResult composite(const LightField& field, const TriangleMesh& mesh_in_w
         "a plate of three channels and the view's size");
   const TriangleMesh mesh = transformed(field.plane.world_from_plane.inverse(), mesh_in_world);
   CompositeResult result;
-  result.layers = render({field, mesh_in_world, view, plate_on_ground(plate, view, field.plane, bounding_sphere(mesh))},
+  result.layers = render({field, mesh_in_world, view, plate_on_ground(plate, view, field.plane, bounds_of(mesh))},
                          options.render, progress);
   const RenderResult& layers = result.layers;
   result.picture = ImageF(plate.width, plate.height, 3);

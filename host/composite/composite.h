@@ -31,6 +31,6 @@ struct CompositeResult {
 // The plate as the radiance of the plane around the object. Where the camera doesn't see the plane, the radiance is
 // that of the nearest parts that it sees, ever more blurred with the distance (push–pull, Gortler et al. 1996, §3.4).
 [[nodiscard]] GroundRadiance plate_on_ground(const ImageF& plate, const View&, const PlaneRectangle&,
-                                             const BoundingSphere& object_in_plane);
+                                             const Bounds& object_in_plane);
 
 }  // namespace mf

@@ -3,8 +3,10 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "common/check.h"
 
@@ -24,6 +26,17 @@ std::vector<Eigen::Vector3f> even_directions(int count) {
   return directions;
 }
 
+// Ten bits an axis, interleaved: neighbours in this order are neighbours in space (Morton 1966), as packets like it.
+std::uint32_t morton_code(const Eigen::Vector3f& p, const Bounds& bounds) {
+  const Eigen::Vector3f fraction = (p - bounds.centre) / (2 * std::max(bounds.radius, 1e-12F));  // no size: one place
+  std::uint32_t code = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto cell = static_cast<std::uint32_t>(std::clamp((fraction[axis] + 0.5F) * 1024, 0.F, 1023.F));
+    for (int bit = 0; bit < 10; ++bit) code |= ((cell >> bit) & 1U) << (3 * bit + axis);
+  }
+  return code;
+}
+
 }  // namespace
 
 std::vector<SurfacePoint> vertex_points(const TriangleMesh& mesh) {
@@ -35,7 +48,18 @@ std::vector<SurfacePoint> vertex_points(const TriangleMesh& mesh) {
 }
 
 std::vector<Eigen::Vector3f> vertex_irradiance(const TriangleMesh& mesh, const RayScene& scene, const LightSet& set) {
-  return irradiance_cpu(scene, vertex_points(mesh), set, LightSum::visible);
+  std::vector<std::uint32_t> order(mesh.positions.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::vector<std::uint32_t> code;
+  for (const Eigen::Vector3f& p : mesh.positions) code.push_back(morton_code(p, scene.bounds()));
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return code[a] < code[b]; });
+  const std::vector<SurfacePoint> points = vertex_points(mesh);
+  std::vector<SurfacePoint> sorted;
+  for (const std::uint32_t i : order) sorted.push_back(points[i]);
+  const std::vector<Eigen::Vector3f> by_order = irradiance_cpu(scene, sorted, set, LightSum::visible);
+  std::vector<Eigen::Vector3f> result(by_order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) result[order[k]] = by_order[k];
+  return result;
 }
 
 std::vector<Eigen::Vector3f> gather_bounce(const TriangleMesh& mesh, const RayScene& scene,

@@ -46,12 +46,18 @@ Packet make_packet(std::span<const SurfacePoint> points, float offset) {
   return packet;
 }
 
-// Can a ray from the packet along ω meet the sphere that holds the mesh?
-bool may_meet(const BoundingSphere& bounds, const Packet& packet, const Eigen::Vector3f& direction) {
-  const Eigen::Vector3f to_centre = bounds.centre - packet.centre;
-  const float reach = bounds.radius + packet.radius;
-  const float along = to_centre.dot(direction);
-  return along > -reach && to_centre.squaredNorm() - along * along < reach * reach;
+// Can a ray from somewhere in a sphere along ω meet the box that holds the mesh? Slabs (Kay & Kajiya 1986), the box
+// made larger by the sphere.
+bool may_meet(const Bounds& bounds, const Eigen::Vector3f& centre, float radius, const Eigen::Vector3f& direction) {
+  float enter = 0, leave = std::numeric_limits<float>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const float low = bounds.low[axis] - radius - centre[axis];
+    const float high = bounds.high[axis] + radius - centre[axis];
+    const float inverse = 1 / direction[axis];  // ±∞ for a ray along the slab: 0 · ∞ is NaN, which min and max pass by
+    enter = std::max(enter, std::min(low * inverse, high * inverse));
+    leave = std::min(leave, std::max(low * inverse, high * inverse));
+  }
+  return enter <= leave;
 }
 
 // max(0, n·ω), zero too where the light is behind the triangle (when `one_sided`). Returns whether any lane is lit.
@@ -73,7 +79,6 @@ class Tracer {
 
   // Zeroes the cosine of every lane that the sum leaves out. Returns whether any is left.
   bool mask(const Packet& packet, const Eigen::Vector3f& direction, Lanes& cosine) {
-    if (!may_meet(scene_->bounds(), packet, direction)) return sum_ == LightSum::visible;
     alignas(64) std::array<int, lanes> active{};
     RTCRay16 ray;
     for (std::size_t i = 0; i < lanes; ++i) {
@@ -112,22 +117,45 @@ void add_light(const Packet& packet, const DirectionalLight& light, const PlaneI
   }
 }
 
+// Points that go through the lights together.
+struct Block {
+  std::vector<Packet> packets;
+  Eigen::Vector3f centre = Eigen::Vector3f::Zero();
+  float radius = 0;
+};
+
+Block make_block(std::span<const SurfacePoint> points, float offset) {
+  Block block;
+  for (std::size_t i = 0; i < points.size(); i += lanes)
+    block.packets.push_back(make_packet(points.subspan(i, std::min(lanes, points.size() - i)), offset));
+  for (const Packet& p : block.packets) block.centre += p.centre / static_cast<float>(block.packets.size());
+  for (const Packet& p : block.packets)
+    block.radius = std::max(block.radius, (p.centre - block.centre).norm() + p.radius);
+  return block;
+}
+
 void sum_block(const RayScene& scene, std::span<const SurfacePoint> points, const LightSet& set, LightSum sum,
                Eigen::Vector3f* result) {
-  std::vector<Packet> packets;
-  for (std::size_t i = 0; i < points.size(); i += lanes)
-    packets.push_back(make_packet(points.subspan(i, std::min(lanes, points.size() - i)), scene.surface_offset_m()));
+  const Block block = make_block(points, scene.surface_offset_m());
   Sums zero;
   zero.fill(Eigen::Vector4f::Zero());
-  std::vector<Sums> sums(packets.size(), zero);
+  std::vector<Sums> sums(block.packets.size(), zero);
   Tracer tracer(scene, sum);
+  const bool blocked = sum == LightSum::blocked;
   alignas(64) Lanes cosine;
-  for (const DirectionalLight& light : set.lights)
-    for (std::size_t k = 0; k < packets.size(); ++k) {
-      if (!cosines(packets[k], light.direction, sum == LightSum::visible, cosine)) continue;
-      if (!tracer.mask(packets[k], light.direction, cosine)) continue;
-      add_light(packets[k], light, set.images[light.image], cosine, sums[k]);
+  for (const DirectionalLight& light : set.lights) {
+    const Eigen::Vector3f& w = light.direction;
+    const bool near = may_meet(scene.bounds(), block.centre, block.radius, w);
+    if (blocked && !near) continue;
+    for (std::size_t k = 0; k < block.packets.size(); ++k) {
+      const Packet& packet = block.packets[k];
+      const bool trace = near && may_meet(scene.bounds(), packet.centre, packet.radius, w);
+      if (blocked && !trace) continue;
+      if (!cosines(packet, w, !blocked, cosine)) continue;
+      if (trace && !tracer.mask(packet, w, cosine)) continue;
+      add_light(packet, light, set.images[light.image], cosine, sums[k]);
     }
+  }
   for (std::size_t i = 0; i < points.size(); ++i) result[i] = sums[i / lanes][i % lanes].head<3>();
 }
 

@@ -71,6 +71,39 @@ LightSet make_light_set(const LightField& field, const ImportanceOptions& option
   return set;
 }
 
+LightField coarsened(const LightField& field, int directions) {
+  const DirectionSet coarse = geodesic_hemisphere(directions);
+  if (coarse.size() >= field.directions.size()) return field;
+  const DirectionLocator locator(coarse);
+  const std::vector<double> power = cell_power(field);
+  LightField result;
+  result.plane = field.plane;
+  result.proxy = field.proxy;
+  result.resolution = field.resolution;
+  result.directions.directions.assign(coarse.size(), Eigen::Vector3f::Zero());
+  result.directions.solid_angles_sr.assign(coarse.size(), 0);
+  result.rgbc.assign(coarse.size() * field.texel_count(), Eigen::Vector4f::Zero());
+  for (std::size_t i = 0; i < field.directions.size(); ++i) {
+    const Eigen::Vector3f& d = field.directions.directions[i];
+    const DirectionWeights w = locator.locate(d);
+    const auto nearest = std::max_element(w.weight.begin(), w.weight.end()) - w.weight.begin();
+    const std::uint32_t to = w.index[static_cast<std::size_t>(nearest)];
+    const float solid_angle = field.directions.solid_angles_sr[i];
+    // A trace of the solid angle gives a cell without light a direction too.
+    result.directions.directions[to] += (static_cast<float>(power[i]) + 1e-6F * solid_angle) * d;
+    result.directions.solid_angles_sr[to] += solid_angle;
+    for (std::size_t t = 0; t < field.texel_count(); ++t) result.tile(to)[t] += solid_angle * field.tile(i)[t];
+  }
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    const float solid_angle = result.directions.solid_angles_sr[i];
+    Eigen::Vector3f& d = result.directions.directions[i];
+    d = solid_angle > 0 ? d.normalized() : coarse.directions[i];
+    if (solid_angle > 0)
+      for (std::size_t t = 0; t < field.texel_count(); ++t) result.tile(i)[t] /= solid_angle;
+  }
+  return result;
+}
+
 void append_ground_light(LightSet& set, const PlaneImage& outgoing_radiance, int count) {
   check(count > 0, "some directions");
   const auto image = static_cast<std::uint32_t>(set.images.size());

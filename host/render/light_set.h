@@ -55,6 +55,10 @@ struct ImportanceOptions {
 // texels of the field, which must outlive it. Energy is kept: the solid angles of a cell's points sum to the cell's.
 [[nodiscard]] LightSet make_light_set(const LightField&, const ImportanceOptions&);
 
+// The same light from about `directions` directions only: cells merged with their neighbours, energy kept, each merged
+// cell in the direction that its light mostly comes from. For what varies slowly.
+[[nodiscard]] LightField coarsened(const LightField&, int directions);
+
 // What a plane sends up, as parallel lights from below: `count` directions over the lower hemisphere, one image.
 void append_ground_light(LightSet&, const PlaneImage& outgoing_radiance, int count);
 

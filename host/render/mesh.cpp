@@ -112,17 +112,17 @@ TriangleMesh transformed(const Rigid3& target_from_source, TriangleMesh mesh) {
   return mesh;
 }
 
-BoundingSphere bounding_sphere(const TriangleMesh& mesh) {
+Bounds bounds_of(const TriangleMesh& mesh) {
   if (mesh.positions.empty()) return {};
-  Eigen::Vector3f low = mesh.positions.front();
-  Eigen::Vector3f high = low;
+  Bounds bounds;
+  bounds.low = bounds.high = mesh.positions.front();
   for (const Eigen::Vector3f& p : mesh.positions) {
-    low = low.cwiseMin(p);
-    high = high.cwiseMax(p);
+    bounds.low = bounds.low.cwiseMin(p);
+    bounds.high = bounds.high.cwiseMax(p);
   }
-  BoundingSphere sphere{(low + high) / 2, 0};
-  for (const Eigen::Vector3f& p : mesh.positions) sphere.radius = std::max(sphere.radius, (p - sphere.centre).norm());
-  return sphere;
+  bounds.centre = (bounds.low + bounds.high) / 2;
+  for (const Eigen::Vector3f& p : mesh.positions) bounds.radius = std::max(bounds.radius, (p - bounds.centre).norm());
+  return bounds;
 }
 
 }  // namespace mf

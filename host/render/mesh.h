@@ -36,11 +36,13 @@ inline constexpr float default_albedo = 0.7F;
 
 [[nodiscard]] TriangleMesh transformed(const Rigid3& target_from_source, TriangleMesh);
 
-// A sphere that holds every vertex: the centre of the bounding box, and the farthest vertex' distance.
-struct BoundingSphere {
+// The axis-aligned box of every vertex, and a sphere about its centre that holds them too. Empty mesh: all zero.
+struct Bounds {
+  Eigen::Vector3f low = Eigen::Vector3f::Zero();
+  Eigen::Vector3f high = Eigen::Vector3f::Zero();
   Eigen::Vector3f centre = Eigen::Vector3f::Zero();
   float radius = 0;
 };
-[[nodiscard]] BoundingSphere bounding_sphere(const TriangleMesh&);
+[[nodiscard]] Bounds bounds_of(const TriangleMesh&);
 
 }  // namespace mf

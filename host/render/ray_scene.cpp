@@ -17,7 +17,7 @@ RTCIntersectContext coherent_context() {
 }
 
 RayScene::RayScene(const TriangleMesh& mesh)
-    : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)), bounds_(bounding_sphere(mesh)) {
+    : device_(rtcNewDevice(nullptr)), scene_(rtcNewScene(device_)), bounds_(bounds_of(mesh)) {
   check(device_ != nullptr && scene_ != nullptr, "Embree starts");
   // Robust: no ray slips between two triangles that share an edge, which would leak light through a closed mesh.
   rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);

@@ -20,7 +20,7 @@ class RayScene {
   ~RayScene();
 
   [[nodiscard]] RTCScene handle() const { return scene_; }
-  [[nodiscard]] const BoundingSphere& bounds() const { return bounds_; }
+  [[nodiscard]] const Bounds& bounds() const { return bounds_; }
 
   // How far a shadow ray must start off its surface, metres: well above the rounding of single-precision coordinates at
   // the scene's size, well below any detail that a picture shows.
@@ -37,7 +37,7 @@ class RayScene {
  private:
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
-  BoundingSphere bounds_;
+  Bounds bounds_;
   float surface_offset_m_ = 0;
 };
 

@@ -12,6 +12,7 @@ namespace mf {
 namespace {
 
 constexpr int ground_texels = 256;  // a side: 2 % of the object's radius each
+constexpr int bounce_lights = 320;  // what lights the object before the bounce, from above and as many from below
 constexpr int bounce_texels = 96;   // light off the object is smoother than its shadow
 
 std::vector<SurfacePoint> points_of(const GroundRadiance& ground) {
@@ -87,8 +88,9 @@ class Renderer {
     const std::vector<Eigen::Vector3f> blocked = shadow(points);
     darken(light, points, blocked);
     if (options_->bounce_directions == 0) return light;
-    LightSet lights = from_above_;
-    if (input_->ground) append_ground_light(lights, light.radiance.image(), options_->ground_directions);
+    const LightField coarse = coarsened(input_->field, bounce_lights);
+    LightSet lights = make_light_set(coarse, {0, 1});
+    if (input_->ground) append_ground_light(lights, light.radiance.image(), bounce_lights);
     on_vertices_ = vertex_irradiance(mesh_, scene_, lights);
     const std::vector<Eigen::Vector3f> bounced =
         gather_bounce(mesh_, scene_, on_vertices_, points_of(light.bounce), options_->bounce_directions);
@@ -184,7 +186,7 @@ RenderResult render(const RenderInput& input, const RenderOptions& options, cons
 
 GroundRadiance diffuse_ground(const LightField& field, const TriangleMesh& mesh_in_world, double albedo) {
   const TriangleMesh mesh = transformed(field.plane.world_from_plane.inverse(), mesh_in_world);
-  GroundRadiance ground = ground_around(bounding_sphere(mesh), ground_texels);
+  GroundRadiance ground = ground_around(bounds_of(mesh), ground_texels);
   const PlaneIrradiance bare(field);
   for (int y = 0; y < ground.height; ++y)
     for (int x = 0; x < ground.width; ++x) {
