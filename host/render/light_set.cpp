@@ -78,7 +78,7 @@ LightField coarsened(const LightField& field, int directions) {
   const std::vector<double> power = cell_power(field);
   LightField result;
   result.plane = field.plane;
-  result.proxy = field.proxy;
+  result.surroundings = field.surroundings;
   result.resolution = field.resolution;
   result.directions.directions.assign(coarse.size(), Eigen::Vector3f::Zero());
   result.directions.solid_angles_sr.assign(coarse.size(), 0);
