@@ -49,7 +49,8 @@ Eigen::Vector3f ray_of(const FieldView& view, float u, float v) {
 struct Area {
   Eigen::Vector2f weighted_sum = Eigen::Vector2f::Zero();
   float weight = 0;
-  int pixels = 0;
+  float luminance_sum = 0;
+  float luminance_max = 0;
   bool cut = false;  // touches the view's border
 };
 
@@ -66,7 +67,8 @@ Area flood(const PremultipliedImage& image, int x, int y, float threshold, std::
     const float weight = std::min(luminance(texel), 4 * threshold);
     area.weighted_sum += weight * (at.cast<float>().array() + 0.5F).matrix();
     area.weight += weight;
-    ++area.pixels;
+    area.luminance_sum += luminance(texel);
+    area.luminance_max = std::max(area.luminance_max, luminance(texel));
     for (int side = 0; side < 4; ++side) {
       const Eigen::Vector2i step(side == 0 ? 1 : side == 1 ? -1 : 0, side == 2 ? 1 : side == 3 ? -1 : 0);
       const Eigen::Vector2i next = at + step;
@@ -90,11 +92,18 @@ void collect_spots(const FieldView& view, float threshold, const EmitterOptions&
       if (visited[static_cast<std::size_t>(y * image.width() + x)] != 0 || luminance(image.at(x, y)) < threshold)
         continue;
       const Area area = flood(image, x, y, threshold, visited);
-      const float radius =
-          std::sqrt(static_cast<float>(area.pixels) / std::numbers::pi_v<float>) * scale / view.focal_px;
-      if (area.cut || 2 * radius > options.largest_angle_rad) continue;
       const Eigen::Vector2f centre = area.weighted_sum / area.weight * scale;
-      spots.push_back({view.centre_in_world, ray_of(view, centre.x(), centre.y()), radius});
+      // Pixels at its edge hold only a part of it: the area is that of the same light at full brightness, which a small
+      // lamp has only in the finest level.
+      const float peak = std::max(area.luminance_max, luminance(view.fetch(0, centre.x(), centre.y())));
+      const float pixels = area.luminance_sum / peak;
+      const Eigen::Vector3f ray = ray_of(view, centre.x(), centre.y());
+      // A pixel's solid angle falls with the cube of the cosine to the axis.
+      const float cosine = view.pixel_from_world.row(2).head<3>().dot(ray);
+      const float radius =
+          std::sqrt(pixels * cosine * cosine * cosine / std::numbers::pi_v<float>) * scale / view.focal_px;
+      if (area.cut || 2 * radius > options.largest_angle_rad) continue;
+      spots.push_back({view.centre_in_world, ray, radius});
     }
 }
 
@@ -140,8 +149,8 @@ std::optional<Eigen::Vector3f> propose(const Spot& a, const Spot& b, const Emitt
 float typical_radius(const std::vector<const Spot*>& rays, const Eigen::Vector3f& x) {
   std::vector<float> radii;
   for (const Spot* ray : rays) radii.push_back(ray->radius_rad * (x - ray->origin).norm());
-  // Occluders only make spots smaller: the upper quartile is nearer to the lamp than the median.
-  const auto upper = radii.begin() + static_cast<std::ptrdiff_t>(3 * radii.size() / 4);
+  // Occluders only make spots smaller: a value above the median is nearer to the lamp.
+  const auto upper = radii.begin() + static_cast<std::ptrdiff_t>(3 * radii.size() / 5);
   std::nth_element(radii.begin(), upper, radii.end());
   return *upper;
 }

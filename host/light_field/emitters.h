@@ -5,15 +5,9 @@
 #include <vector>
 
 #include "host/light_field/field_views.h"
+#include "host/light_field/shaded_emitter.h"
 
 namespace mf {
-
-// A small bright source that several views saw from different places: a lamp. World frame.
-struct Emitter {
-  Eigen::Vector3f position;
-  float radius_m = 0;  // of a ball of the solid angle under which it appears
-  int views = 0;       // that agree on it
-};
 
 struct EmitterOptions {
   float brightness = 30;           // times the views' mean radiance: what counts as bright

@@ -8,6 +8,7 @@
 
 #include "common/rigid3.h"
 #include "host/light_field/direction_set.h"
+#include "host/light_field/shaded_emitter.h"
 #include "host/light_field/surroundings.h"
 
 namespace mf {
@@ -30,7 +31,8 @@ struct PlaneRectangle {
 struct LightField {
   PlaneRectangle plane;
   DirectionSet directions;
-  Surroundings surroundings;  // on which the views were focused
+  Surroundings surroundings;            // on which the views were focused
+  std::vector<ShadedEmitter> emitters;  // small bright sources among them; their light is in the tiles too
   int resolution = 0;
   bool absolute = false;     // radiance is in the units of the reference reading
   std::string options_json;  // the options that made it

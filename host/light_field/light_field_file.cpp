@@ -2,6 +2,7 @@
 #include <ImathMatrix.h>
 #include <ImathVec.h>
 #include <ImfChannelList.h>
+#include <ImfFloatAttribute.h>
 #include <ImfFloatVectorAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputPart.h>
@@ -195,20 +196,37 @@ void read_tiles(Imf::MultiPartInputFile& file, LightField& field) {
   }
 }
 
-// ---- the surroundings: one part a map ----
+// ---- the surroundings and the emitters: one part a map ----
 
 struct NamedMap {
-  const char* name;
+  std::string name;
   std::vector<const char*> channels;
   const ImageF* map;
+  const ShadedEmitter* emitter = nullptr;  // whose mask it is
 };
 
-std::vector<NamedMap> maps_of(const Surroundings& s) {
+std::vector<NamedMap> maps_of(const LightField& field) {
+  const Surroundings& s = field.surroundings;
   std::vector<NamedMap> maps;
   if (!s.inverse_distance.empty()) maps.push_back({"inverseDistance", {"Y"}, &s.inverse_distance});
   if (!s.confidence.empty()) maps.push_back({"distanceConfidence", {"Y"}, &s.confidence});
   if (!s.panorama.empty()) maps.push_back({"panorama", {"R", "G", "B", "A"}, &s.panorama});
+  for (std::size_t i = 0; i < field.emitters.size(); ++i)
+    maps.push_back(
+        {fmt::format("emitter{}", i), {"visibility", "weight"}, &field.emitters[i].mask, &field.emitters[i]});
   return maps;
+}
+
+void describe(const ShadedEmitter& e, Imf::Header& header) {
+  const auto vector = [](const Eigen::Vector3f& v) { return Imf::V3fAttribute({v.x(), v.y(), v.z()}); };
+  header.insert("mfPosition", vector(e.emitter.position));
+  header.insert("mfRadiance", vector(e.radiance));
+  header.insert("mfRadius", Imf::FloatAttribute(e.emitter.radius_m));
+  header.insert("mfViews", Imf::IntAttribute(e.emitter.views));
+  header.insert("mfOccluderShare", Imf::FloatAttribute(e.occluder_share));
+  header.insert("mfPlaneHeight", Imf::FloatAttribute(e.plane_height_m));
+  header.insert("mfMaskMin", Imf::V2fAttribute({e.mask_min_m.x(), e.mask_min_m.y()}));
+  header.insert("mfMaskMax", Imf::V2fAttribute({e.mask_max_m.x(), e.mask_max_m.y()}));
 }
 
 // All parts of a file share the display window: the field's.
@@ -220,6 +238,7 @@ Imf::Header header_of(const NamedMap& map, const Surroundings& s, const Imath::B
   Imf::addChromaticities(header, Imf::Chromaticities());
   for (const char* channel : map.channels) header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
   header.insert("mfCentre", Imf::V3fAttribute({s.centre_in_world.x(), s.centre_in_world.y(), s.centre_in_world.z()}));
+  if (map.emitter != nullptr) describe(*map.emitter, header);
   return header;
 }
 
@@ -249,7 +268,28 @@ ImageF read_map(Imf::MultiPartInputFile& file, int part, const std::vector<const
   return map;
 }
 
-void read_surroundings(Imf::MultiPartInputFile& file, Surroundings& s, const std::string& path) {
+ShadedEmitter emitter_of(const Imf::Header& header, const std::string& path) {
+  const auto vector = [&](const char* name) {
+    const Imath::V3f& v = attribute<Imf::V3fAttribute>(header, name, path);
+    return Eigen::Vector3f(v.x, v.y, v.z);
+  };
+  const auto vector2 = [&](const char* name) {
+    const Imath::V2f& v = attribute<Imf::V2fAttribute>(header, name, path);
+    return Eigen::Vector2f(v.x, v.y);
+  };
+  ShadedEmitter e;
+  e.emitter = {vector("mfPosition"), attribute<Imf::FloatAttribute>(header, "mfRadius", path),
+               attribute<Imf::IntAttribute>(header, "mfViews", path)};
+  e.radiance = vector("mfRadiance");
+  e.occluder_share = attribute<Imf::FloatAttribute>(header, "mfOccluderShare", path);
+  e.plane_height_m = attribute<Imf::FloatAttribute>(header, "mfPlaneHeight", path);
+  e.mask_min_m = vector2("mfMaskMin");
+  e.mask_max_m = vector2("mfMaskMax");
+  return e;
+}
+
+void read_maps(Imf::MultiPartInputFile& file, LightField& field, const std::string& path) {
+  Surroundings& s = field.surroundings;
   for (int part = 1; part < file.parts(); ++part) {
     const std::string name = file.header(part).name();
     const Imath::V3f& centre = attribute<Imf::V3fAttribute>(file.header(part), "mfCentre", path);
@@ -257,6 +297,9 @@ void read_surroundings(Imf::MultiPartInputFile& file, Surroundings& s, const std
     if (name == "inverseDistance") s.inverse_distance = read_map(file, part, {"Y"});
     if (name == "distanceConfidence") s.confidence = read_map(file, part, {"Y"});
     if (name == "panorama") s.panorama = read_map(file, part, {"R", "G", "B", "A"});
+    if (!name.starts_with("emitter")) continue;
+    field.emitters.push_back(emitter_of(file.header(part), path));
+    field.emitters.back().mask = read_map(file, part, {"visibility", "weight"});
   }
 }
 
@@ -271,12 +314,12 @@ void write_light_field(const std::filesystem::path& path, const LightField& fiel
   AtomicFile file(path);
   try {
     std::vector<Imf::Header> headers{header_of(field)};
-    for (const NamedMap& map : maps_of(field.surroundings))
+    for (const NamedMap& map : maps_of(field))
       headers.push_back(header_of(map, field.surroundings, headers.front().displayWindow()));
     Imf::MultiPartOutputFile out(file.path().c_str(), headers.data(), static_cast<int>(headers.size()));
     write_tiles(out, field);
     int part = 1;
-    for (const NamedMap& map : maps_of(field.surroundings)) write_map(out, part++, map);
+    for (const NamedMap& map : maps_of(field)) write_map(out, part++, map);
   } catch (const std::exception& e) {
     throw InputError(
         path.string(), "",
@@ -291,7 +334,7 @@ LightField read_light_field(const std::filesystem::path& path) {
     Imf::MultiPartInputFile in(path.c_str());
     LightField field = field_without_texels(in.header(0), path.string());
     read_tiles(in, field);
-    read_surroundings(in, field.surroundings, path.string());
+    read_maps(in, field, path.string());
     return field;
   } catch (const InputError&) {
     throw;

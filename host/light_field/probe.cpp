@@ -81,7 +81,22 @@ namespace {
 
 constexpr int part_splits = 3;  // 48 parts a cell: at 2500 directions each is about a pixel of the panorama
 
-// The panorama averaged over each cell of the field as the point x sees it: colour and weight.
+// What the surroundings show along a ray, finer than the field: the panorama, and emitters behind their occluders.
+Eigen::Vector4f fine_light(const LightField& field, const FieldSampler& sampler, const FieldRay& ray) {
+  const Rigid3& world_from_plane = field.plane.world_from_plane;
+  const Eigen::Vector3f p = (world_from_plane * Eigen::Vector3d(static_cast<double>(ray.p_in_plane.x()),
+                                                                static_cast<double>(ray.p_in_plane.y()), 0))
+                                .cast<float>();
+  const Eigen::Vector3f d = world_from_plane.rotation.cast<float>() * ray.direction;
+  for (const ShadedEmitter& e : field.emitters)
+    if (e.met_at(p, d)) {
+      const Eigen::Vector3f colour = e.visibility(p, d).value_or(1.0F) * e.radiance;
+      return {colour.x(), colour.y(), colour.z(), 1};
+    }
+  return field.surroundings.panorama_at(sampler.seen_from_centre(ray));
+}
+
+// The fine light averaged over each cell of the field as the point x sees it: colour and weight.
 std::vector<Eigen::Vector4f> panorama_cell_means(const LightField& field, const FieldSampler& sampler,
                                                  const Eigen::Vector3d& x_in_world) {
   const Rigid3& world_from_plane = field.plane.world_from_plane;
@@ -93,7 +108,7 @@ std::vector<Eigen::Vector4f> panorama_cell_means(const LightField& field, const 
       const auto ray = sampler.field_ray(x_in_world, world_from_plane.rotation * part.direction.cast<double>());
       solid_angle += part.solid_angle_sr;
       if (!ray) continue;
-      const Eigen::Vector4f seen = field.surroundings.panorama_at(sampler.seen_from_centre(*ray));
+      const Eigen::Vector4f seen = fine_light(field, sampler, *ray);
       sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
     }
     if (sum.w() > 0) means[i] << sum.head<3>() / sum.w(), sum.w() / solid_angle;
@@ -127,12 +142,13 @@ class DetailedProbe {
       const Eigen::Vector4f& mean = means_[near.index[i]];
       smooth += near.weight[i] * mean.w() * Eigen::Vector4f(mean.x(), mean.y(), mean.z(), 1);
     }
-    const Eigen::Vector4f fine = field_.surroundings.panorama_at(sampler_.seen_from_centre(ray));
+    const Eigen::Vector4f fine = fine_light(field_, sampler_, ray);
     constexpr float enough = 0.5F;  // weight below which the panorama says too little
     if (smooth.w() < enough || fine.w() < enough) return Eigen::Array3f::Ones();
     constexpr float strongest = 32;  // a lamp of a pixel in a dark cell; more would be noise
     const Eigen::Array3f below = (smooth.head<3>() / smooth.w()).array().max(1e-6F);
-    return (fine.head<3>().array() / below).min(strongest).max(1 / strongest);
+    constexpr float weakest = 1e-3F;  // beside a lamp, in its cell
+    return (fine.head<3>().array() / below).min(strongest).max(weakest);
   }
 
   const LightField& field_;

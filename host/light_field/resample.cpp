@@ -25,9 +25,10 @@ double seconds_since(Clock::time_point start) {
 }
 
 Surroundings choose_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                                 const std::string& proxy, int k, std::vector<SphereScore>& scores) {
+                                 const std::string& proxy, int k, std::span<const Emitter> emitters,
+                                 std::vector<SphereScore>& scores) {
   if (proxy == "plane") return {};
-  if (proxy == "auto") return find_surroundings(views, rectangle);
+  if (proxy == "auto") return find_surroundings(views, rectangle, emitters);
   if (const auto radius = parse_sphere(proxy)) return sphere_surroundings(centre_of(rectangle), *radius);
   scores = score_spheres(views, rectangle, k);
   const auto best = std::min_element(scores.begin(), scores.end(), [](const SphereScore& a, const SphereScore& b) {
@@ -58,8 +59,9 @@ double mean_confidence(const LightField& field) {
   return sum / weights;
 }
 
-void fill_tiles(const std::vector<FieldView>& views, LightField& field, int k, const Progress& progress) {
-  tbb::enumerable_thread_specific<TileResampler> resamplers([&] { return TileResampler(views, field, k); });
+void fill_tiles(const std::vector<FieldView>& views, LightField& field, const EmitterBlender& emitters, int k,
+                const Progress& progress) {
+  tbb::enumerable_thread_specific<TileResampler> resamplers([&] { return TileResampler(views, field, emitters, k); });
   std::mutex reporting;
   std::size_t done = 0;
   tbb::parallel_for(std::size_t{0}, field.directions.size(), [&](std::size_t i) {
@@ -96,16 +98,19 @@ ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangl
 
   auto start = Clock::now();
   report_progress(progress, "focusing", 0);
-  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, result.sphere_scores);
+  const std::vector<Emitter> emitters = options.proxy == "plane" ? std::vector<Emitter>{} : find_emitters(views);
+  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, result.sphere_scores);
+  const EmitterBlender emitter_blender(views, field.surroundings, emitters, rectangle);
+  field.emitters = emitter_blender.emitters();
   if (!field.surroundings.is_plane())
-    field.surroundings.panorama = make_panorama(views, field.surroundings, panorama_width);
+    field.surroundings.panorama = make_panorama(views, field.surroundings, emitter_blender, panorama_width);
   report_progress(progress, "focusing", 1);
   result.seconds["focusing"] = seconds_since(start);
   field.options_json = options_to_json(options, k, field.surroundings);
 
   start = Clock::now();
   field.rgbc.assign(field.directions.size() * field.texel_count(), Eigen::Vector4f::Zero());
-  fill_tiles(views, field, k, progress);
+  fill_tiles(views, field, emitter_blender, k, progress);
   result.seconds["blending"] = seconds_since(start);
   result.mean_confidence = mean_confidence(field);
   return result;

@@ -8,9 +8,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include "host/blending/view_weights.h"
-#include "host/light_field/emitters.h"
 #include "host/light_field/view_rays.h"
 
 namespace mf {
@@ -246,7 +246,8 @@ void set_distance(Surroundings& s, const Emitter& emitter) {
 
 }  // namespace
 
-Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle) {
+Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
+                               std::span<const Emitter> emitters) {
   const float nearest_m = nearest_share * 0.5F * static_cast<float>(rectangle.size_m().norm());
   const float level_step = 1 / nearest_m / static_cast<float>(level_count - 1);
   Surroundings s;
@@ -262,15 +263,19 @@ Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneR
       s.confidence.at(x, y) = best.confidence;
     }
   s.inverse_distance = median_of_nine(s.inverse_distance);
-  for (const Emitter& emitter : find_emitters(views)) set_distance(s, emitter);
+  for (const Emitter& emitter : emitters) set_distance(s, emitter);
   return s;
 }
 
-ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& surroundings, int width) {
-  constexpr int k = 4;  // few: every further view blurs what the distance gets wrong
+ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& surroundings,
+                     const EmitterBlender& emitters, int width) {
+  constexpr float emitter_angle_rad = 0.012F;  // beside an emitter, noise would be multiplied by its light
+  constexpr int k = 4;                         // few: every further view blurs what the distance gets wrong
   const int height = width / 4;
   const float texel_rad = 2 * std::numbers::pi_v<float> / static_cast<float>(width);
   ImageF panorama(width, height, 4);
+  std::vector<std::uint32_t> all_views(views.size());
+  std::iota(all_views.begin(), all_views.end(), 0U);
   tbb::parallel_for(0, height, [&](int y) {
     std::vector<ViewPenalty> ranked;
     std::array<ViewWeight, k> weights;
@@ -290,6 +295,14 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
         const float weight = look(views[v]).w();
         if (weight > 0.02F)
           ranked.push_back({v, ray_distance(surroundings.centre_in_world, point, views[v].centre_in_world) / weight});
+      }
+      if (emitters.concerns(surroundings.centre_in_world, d, texel_rad)) {
+        // Unhidden: what stands before an emitter looks different from every point, and the field itself knows it.
+        const auto unhidden = emitters.unhidden(surroundings.centre_in_world, d);
+        Eigen::Vector4f seen = emitters.radiance(surroundings.centre_in_world, d, emitter_angle_rad, all_views);
+        if (unhidden) seen << *unhidden, 1;
+        for (int c = 0; c < 4; ++c) panorama.at(x, y, c) = seen[c];
+        continue;
       }
       const std::size_t speaking = blend_weights(ranked, k, 1e-3F, weights);
       Eigen::Vector4f sum = Eigen::Vector4f::Zero();

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <span>
 #include <vector>
 
+#include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/surroundings.h"
@@ -24,11 +26,14 @@ struct SphereScore {
 // that see a point vote. The cost is the robust spread of their absolute log radiance (the capture is radiometrically
 // calibrated: nothing is normalized), smoothed over neighbouring directions; where the surroundings are featureless any
 // distance serves.
-[[nodiscard]] Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle&);
+// Directions about an emitter get the emitter's distance: it matters most, and a leaf before it hides it best.
+[[nodiscard]] Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle&,
+                                             std::span<const Emitter>);
 
 // The surroundings' panorama as the rectangle's centre sees it, blended from the views that pass nearest to it.
 // `width` × `width`/4 pixels.
-[[nodiscard]] ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings&, int width);
+[[nodiscard]] ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings&, const EmitterBlender&,
+                                   int width);
 
 // World position of the rectangle's centre.
 [[nodiscard]] Eigen::Vector3f centre_of(const PlaneRectangle&);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace mf {
@@ -14,15 +15,19 @@ constexpr int block_vertices = 2;  // vertex steps along a block: all views are 
 constexpr int block_step = vertex_step * block_vertices;
 constexpr int patch = block_vertices + 1;  // vertices along a block, both ends counted
 constexpr std::size_t spare_views = 4;  // ranked beyond k, so that the k best of any texel are among its corners' lists
-constexpr int cell_splits = 1;          // a cell is fetched in 6 · 2¹ parts
+constexpr std::size_t spare_views_near_emitter = 26;  // there many views have no say
+constexpr int fine_splits = 3;                        // and a cell near an emitter in 6 · 2³
+constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
 constexpr float smallest_weight = 0.02F;  // a view that shows less than this of the cell does not speak for it
 constexpr float same_ray = 1e-4F;         // metres (plane proxy: radians): rays closer than this are the same
 
 }  // namespace
 
-TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field, int k)
+TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field,
+                             const EmitterBlender& emitters, int k)
     : views_(views),
       field_(field),
+      emitters_(emitters),
       k_(k),
       blocks_((field.resolution + block_step - 1) / block_step),
       vertices_(blocks_ * block_vertices + 1),
@@ -39,6 +44,10 @@ void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
   for (int by = 0; by < blocks_; ++by)
     for (int bx = 0; bx < blocks_; ++bx) {
       gather_candidates(bx, by);
+      if (near_emitter(bx, by)) {
+        fill_near_emitter(bx, by, tile);
+        continue;
+      }
       fetch_candidates(bx, by);
       for (int y = by * block_step; y < std::min(n, (by + 1) * block_step); ++y)
         for (int x = bx * block_step; x < std::min(n, (bx + 1) * block_step); ++x) tile[y * n + x] = blend(x, y);
@@ -52,11 +61,61 @@ void TileResampler::prepare(std::size_t i) {
   for (CellSample& part : cell_.parts) part.direction = world_from_plane * part.direction;
   cell_.angle_rad = std::sqrt(field_.directions.solid_angles_sr[i]);
   cell_.part_angle_rad = cell_.angle_rad / std::sqrt(static_cast<float>(cell_.parts.size()));
+  bool emitter = false;
   for (int y = 0; y < vertices_; ++y)
     for (int x = 0; x < vertices_; ++x) {
       Vertex& v = vertex_[static_cast<std::size_t>(y * vertices_ + x)];
       v.p = point(static_cast<float>(x * vertex_step), static_cast<float>(y * vertex_step));
       v.focus = focus(v.p);
+      emitter = emitter || emitters_.concerns(v.p, cell_.direction, cell_.angle_rad);
+    }
+  cell_.fine_parts.clear();
+  if (!emitter || field_.surroundings.is_plane()) return;
+  cell_.fine_parts = split_cell(field_.directions, i, fine_splits);
+  for (CellSample& part : cell_.fine_parts) part.direction = world_from_plane * part.direction;
+}
+
+bool TileResampler::near_emitter(int bx, int by) const {
+  if (cell_.fine_parts.empty()) return false;
+  for (int y = 0; y < patch; ++y)
+    for (int x = 0; x < patch; ++x)
+      if (emitters_.concerns(
+              vertex_[static_cast<std::size_t>((by * block_vertices + y) * vertices_ + bx * block_vertices + x)].p,
+              cell_.direction, cell_.angle_rad))
+        return true;
+  return false;
+}
+
+// Each part of the cell is blended by itself, at the block's vertices; texels are interpolated.
+void TileResampler::fill_near_emitter(int bx, int by, Eigen::Vector4f* tile) {
+  std::array<Eigen::Vector4f, patch * patch> mean;
+  const float part_angle = cell_.angle_rad / std::sqrt(static_cast<float>(cell_.fine_parts.size()));
+  for (std::size_t n = 0; n < mean.size(); ++n) {
+    const int x = static_cast<int>(n) % patch, y = static_cast<int>(n) / patch;
+    const Vertex& v =
+        vertex_[static_cast<std::size_t>((by * block_vertices + y) * vertices_ + bx * block_vertices + x)];
+    Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · weight, weight
+    float solid_angle = 0;
+    for (const CellSample& part : cell_.fine_parts) {
+      const Eigen::Vector4f seen = emitters_.radiance(v.p, part.direction, part_angle, candidates_);
+      sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+      solid_angle += part.solid_angle_sr;
+    }
+    mean[n] = sum / solid_angle;
+  }
+  const int size = field_.resolution;
+  for (int y = by * block_step; y < std::min(size, (by + 1) * block_step); ++y)
+    for (int x = bx * block_step; x < std::min(size, (bx + 1) * block_step); ++x) {
+      const float u = (static_cast<float>(x - bx * block_step) + 0.5F) / vertex_step;
+      const float v = (static_cast<float>(y - by * block_step) + 0.5F) / vertex_step;
+      const int i = static_cast<int>(u), j = static_cast<int>(v);
+      const float fu = u - static_cast<float>(i), fv = v - static_cast<float>(j);
+      const Eigen::Vector4f* at = &mean[static_cast<std::size_t>(j * patch + i)];
+      const Eigen::Vector4f sum =
+          (at[0] * (1 - fu) + at[1] * fu) * (1 - fv) + (at[patch] * (1 - fu) + at[patch + 1] * fu) * fv;
+      Eigen::Vector4f& texel = tile[y * size + x];
+      texel = Eigen::Vector4f::Zero();
+      if (sum.w() > 0) texel << sum.head<3>() / sum.w(), sum.w();
     }
 }
 
@@ -92,7 +151,8 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     const float weight = views_[i].fetch(level, pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
     if (weight >= smallest_weight) ranked_.push_back({i, penalty(views_[i], v.p, v.focus) / weight});
   }
-  const std::size_t kept = std::min(static_cast<std::size_t>(k_) + spare_views, ranked_.size());
+  const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
+  const std::size_t kept = std::min(static_cast<std::size_t>(k_) + spare, ranked_.size());
   std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(kept), ranked_.end(),
                     [](const ViewPenalty& a, const ViewPenalty& b) { return a.penalty < b.penalty; });
   auto& best = best_views_[static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x)];

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "host/blending/view_weights.h"
+#include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/view_rays.h"
@@ -21,8 +22,8 @@ namespace mf {
 // resampler a thread: it holds the working memory.
 class TileResampler {
  public:
-  // Keeps references to both; `field` has everything but its texels.
-  TileResampler(const std::vector<FieldView>& views, const LightField& field, int k);
+  // Keeps references to all; `field` has everything but its texels.
+  TileResampler(const std::vector<FieldView>& views, const LightField& field, const EmitterBlender& emitters, int k);
 
   // Precondition: `tile` holds resolution² texels.
   void fill(std::size_t direction, Eigen::Vector4f* tile);
@@ -30,9 +31,10 @@ class TileResampler {
  private:
   // What one direction's tile needs again and again.
   struct Cell {
-    Eigen::Vector3f direction;      // world
-    std::vector<CellSample> parts;  // directions in the world
-    float angle_rad = 0;            // side of a square of the cell's solid angle
+    Eigen::Vector3f direction;           // world
+    std::vector<CellSample> parts;       // directions in the world
+    std::vector<CellSample> fine_parts;  // the same, finer, for cells near emitters; else empty
+    float angle_rad = 0;                 // side of a square of the cell's solid angle
     float part_angle_rad = 0;
   };
   struct Vertex {
@@ -45,6 +47,8 @@ class TileResampler {
   void gather_candidates(int block_x, int block_y);
   void fetch_candidates(int block_x, int block_y);
   [[nodiscard]] Eigen::Vector4f blend(int x, int y);
+  [[nodiscard]] bool near_emitter(int block_x, int block_y) const;
+  void fill_near_emitter(int block_x, int block_y, Eigen::Vector4f* tile);
 
   [[nodiscard]] Eigen::Vector3f point(float texel_x, float texel_y) const;
   [[nodiscard]] ProxyPoint focus(const Eigen::Vector3f& p) const;
@@ -53,6 +57,7 @@ class TileResampler {
 
   const std::vector<FieldView>& views_;
   const LightField& field_;
+  const EmitterBlender& emitters_;
   int k_;
   int blocks_;    // along a side
   int vertices_;  // along a side

@@ -26,6 +26,8 @@ LightField example() {
   field.directions = geodesic_hemisphere(40);
   field.surroundings = sphere_surroundings({0.1F, 0.2F, 0.25F}, 2);
   field.surroundings.panorama = ImageF(8, 2, 4, 0.75F);
+  field.emitters.push_back(
+      {{{0.5F, 0.3F, 0.9F}, 0.05F, 12}, {3, 2, 1}, 0.4F, 0.25F, {-0.4F, -0.3F}, {0.5F, 0.6F}, ImageF(4, 4, 2, 0.5F)});
   field.resolution = 5;
   field.options_json = R"({"k":6})";
   field.rgbc.resize(field.directions.size() * 25);
@@ -45,6 +47,10 @@ TEST_F(LightFieldFile, RoundTrip) {
   EXPECT_EQ(back.options_json, field.options_json);
   EXPECT_EQ(back.plane.min_m, field.plane.min_m);
   EXPECT_TRUE(back.plane.world_from_plane.matrix().isApprox(field.plane.world_from_plane.matrix()));
+  ASSERT_EQ(back.emitters.size(), 1u);
+  EXPECT_EQ(back.emitters[0].emitter.position, field.emitters[0].emitter.position);
+  EXPECT_EQ(back.emitters[0].occluder_share, 0.4F);
+  EXPECT_EQ(back.emitters[0].mask.data, field.emitters[0].mask.data);
   ASSERT_EQ(back.rgbc.size(), field.rgbc.size());
   for (std::size_t i = 0; i < field.rgbc.size(); ++i) ASSERT_EQ(back.rgbc[i], field.rgbc[i]) << i;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "a.lf.exr.partial"));

@@ -99,7 +99,7 @@ TEST(Resample, PhotoConsistencyFindsTheDistance) {
     return a.inconsistency < b.inconsistency;
   });
   EXPECT_DOUBLE_EQ(best->radius_m, 1.4);
-  const Surroundings found = find_surroundings(views, square);
+  const Surroundings found = find_surroundings(views, square, {});
   std::vector<float> distances;
   for (const Eigen::Vector3f& d : geodesic_hemisphere(300).directions)
     if (d.z() > 0.3F) distances.push_back(1 / found.inverse_distance_of(d));

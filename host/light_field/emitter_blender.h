@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "host/light_field/emitters.h"
+#include "host/light_field/field_views.h"
+#include "host/light_field/light_field.h"
+
+namespace mf {
+
+// Rays at and about small bright sources, blended with care for what else is known there.
+//
+// A lamp is thousands of times brighter than what surrounds it, and its edge and the leaves before it lie at different
+// distances: no single focus is right. But a ray either meets the lamp's ball or not, and that is known:
+//  - a ray that meets it is focused on the occluder: of all views' rays through that point of the occluder, those that
+//    meet the ball too say whether it is hidden there (the lamp itself looks the same from everywhere). Together they
+//    draw the occluder's mask;
+//  - a ray that misses it is focused on the surroundings, and views whose own ray meets the ball have no say.
+// So the lamp's outline is sharp where geometry puts it, its shadows' edges are where the occluder puts them, and no
+// ghost of the lamp beside it adds energy.
+class EmitterBlender {
+ public:
+  // Finds each emitter's occluder by photo-consistency over its distance, and draws its mask over the rectangle. Keeps
+  // references to views and surroundings.
+  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::span<const Emitter>,
+                 const PlaneRectangle&);
+
+  // Whether rays within `angle_rad` of the direction may see an emitter or a ghost of one.
+  [[nodiscard]] bool concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
+
+  // Blended colour and weight of one ray with a footprint of `angle_rad`; only `candidates` are asked (indices of
+  // views).
+  [[nodiscard]] Eigen::Vector4f radiance(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad,
+                                         std::span<const std::uint32_t> candidates) const;
+
+  // What an emitter that the ray meets would show if nothing hid it; nothing for rays that meet none.
+  [[nodiscard]] std::optional<Eigen::Vector3f> unhidden(const Eigen::Vector3f& p,
+                                                        const Eigen::Vector3f& direction) const;
+
+  [[nodiscard]] const std::vector<ShadedEmitter>& emitters() const { return emitters_; }
+
+ private:
+  [[nodiscard]] const ShadedEmitter* met_by(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                                            float scale) const;
+
+  const std::vector<FieldView>& views_;
+  const Surroundings& surroundings_;
+  std::vector<ShadedEmitter> emitters_;
+};
+
+}  // namespace mf

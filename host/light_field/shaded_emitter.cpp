@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/shaded_emitter.h"
+
+#include <algorithm>
+
+namespace mf {
+
+std::optional<float> ShadedEmitter::met_at(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                                           float scale) const {
+  const Eigen::Vector3f to = emitter.position - origin;
+  const float along = to.dot(direction), reach = scale * emitter.radius_m;
+  if (along <= 0 || to.squaredNorm() - along * along > reach * reach) return std::nullopt;
+  return along;
+}
+
+Eigen::Vector3f ShadedEmitter::occluder_point(const Eigen::Vector2f& m) const {
+  const Eigen::Vector3f on_plane(m.x(), m.y(), plane_height_m);
+  return emitter.position + (1 - occluder_share) * (on_plane - emitter.position);
+}
+
+std::optional<float> ShadedEmitter::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
+  if (mask.empty()) return std::nullopt;
+  const float along = (emitter.position - p).dot(direction);
+  const Eigen::Vector3f from_emitter = p + occluder_share * along * direction - emitter.position;
+  const Eigen::Vector2f m =
+      (emitter.position + from_emitter * ((plane_height_m - emitter.position.z()) / from_emitter.z())).head<2>();
+  const Eigen::Vector2f size = mask_max_m - mask_min_m;
+  const float x = std::clamp((m.x() - mask_min_m.x()) / size.x() * static_cast<float>(mask.width) - 0.5F, 0.0F,
+                             static_cast<float>(mask.width - 1));
+  const float y = std::clamp((mask_max_m.y() - m.y()) / size.y() * static_cast<float>(mask.height) - 0.5F, 0.0F,
+                             static_cast<float>(mask.height - 1));
+  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, mask.width - 1), y1 = std::min(y0 + 1, mask.height - 1);
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  float sum = 0, weights = 0;
+  const auto add = [&](int tx, int ty, float share) {
+    const float w = share * mask.at(tx, ty, 1);
+    sum += w * mask.at(tx, ty, 0);
+    weights += w;
+  };
+  add(x0, y0, (1 - fx) * (1 - fy));
+  add(x1, y0, fx * (1 - fy));
+  add(x0, y1, (1 - fx) * fy);
+  add(x1, y1, fx * fy);
+  if (weights <= 0) return std::nullopt;
+  return sum / weights;
+}
+
+}  // namespace mf
