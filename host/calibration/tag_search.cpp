@@ -77,6 +77,61 @@ void keep_consistent(std::vector<TagSighting>& found) {
   found = std::move(kept);
 }
 
+// In the order of ids. The same id twice: one is a ghost, and nothing here says which, so neither stays.
+void keep_unique(std::vector<TagSighting>& found) {
+  std::sort(found.begin(), found.end(), [](const TagSighting& a, const TagSighting& b) { return a.id < b.id; });
+  std::vector<TagSighting> kept;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const bool twin_before = i > 0 && found[i - 1].id == found[i].id;
+    const bool twin_after = i + 1 < found.size() && found[i + 1].id == found[i].id;
+    if (!twin_before && !twin_after) kept.push_back(found[i]);
+  }
+  found = std::move(kept);
+}
+
+struct PixelBox {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+// Where the picture is not black: a sensor that reads out a region of interest leaves the rest black.
+PixelBox lit_box(const ImageF& picture) {
+  const float top = *std::max_element(picture.data.begin(), picture.data.end());
+  const float lit = 1e-6F * top;  // any light at all
+  int x0 = picture.width, x1 = -1, y0 = picture.height, y1 = -1;
+  for (int y = 0; y < picture.height; ++y)
+    for (int x = 0; x < picture.width; ++x)
+      if (picture.at(x, y) > lit) {
+        x0 = std::min(x0, x), x1 = std::max(x1, x);
+        y0 = std::min(y0, y), y1 = std::max(y1, y);
+      }
+  if (x1 < x0) return {0, 0, picture.width, picture.height};
+  constexpr int margin = 8;  // a tag at the border keeps its surroundings
+  x0 = std::max(0, x0 - margin), y0 = std::max(0, y0 - margin);
+  x1 = std::min(picture.width - 1, x1 + margin), y1 = std::min(picture.height - 1, y1 + margin);
+  return {x0, y0, x1 - x0 + 1, y1 - y0 + 1};
+}
+
+ImageF cropped(const ImageF& picture, const PixelBox& box) {
+  ImageF out(box.width, box.height, 1);
+  for (int y = 0; y < box.height; ++y)
+    std::copy_n(picture.row(box.y + y).begin() + box.x, box.width, out.row(y).begin());
+  return out;
+}
+
+// Bilinear; pixel edges stay where they are, so that positions double exactly.
+ImageF twice_the_size(const ImageF& in) {
+  ImageF out(2 * in.width, 2 * in.height, 1);
+  for (int y = 0; y < out.height; ++y) {
+    const int near_y = y / 2, far_y = std::clamp(near_y + (y % 2 == 0 ? -1 : 1), 0, in.height - 1);
+    for (int x = 0; x < out.width; ++x) {
+      const int near_x = x / 2, far_x = std::clamp(near_x + (x % 2 == 0 ? -1 : 1), 0, in.width - 1);
+      out.at(x, y) = 0.5625F * in.at(near_x, near_y) + 0.1875F * (in.at(far_x, near_y) + in.at(near_x, far_y)) +
+                     0.0625F * in.at(far_x, far_y);
+    }
+  }
+  return out;
+}
+
 bool in_one_plane(const SearchedTarget& target) {
   double low = INFINITY, high = -INFINITY;
   for (const auto& [id, corners] : target.corners_in_target)
@@ -130,15 +185,22 @@ ImageF luminance(const ImageF& picture) {
   return out;
 }
 
+namespace {
+
+TagDetectorOptions detector_options(const std::string& family, double quad_decimate) {
+  TagDetectorOptions options;
+  options.family = family;
+  options.quad_decimate = quad_decimate;
+  return options;
+}
+
+}  // namespace
+
 TagSearch::TagSearch(SearchedTarget target, const TagSearchOptions& options)
     : target_(std::move(target)),
       options_(options),
-      detector_([&] {
-        TagDetectorOptions detector;
-        detector.family = target_.family;
-        detector.quad_decimate = options.quad_decimate;
-        return detector;
-      }()) {
+      detector_(detector_options(target_.family, options.quad_decimate)),
+      hard_detector_(detector_options(target_.family, 1)) {
   for (const auto& [id, corners] : target_.corners_in_target) patterns_.emplace(id, tag_pattern(target_.family, id));
 }
 
@@ -151,33 +213,47 @@ std::optional<TagSighting> TagSearch::align(const ImageF& picture, PixelLayout l
   return TagSighting{id, target_.corners_in_target.at(id), refined->corners_px, refined->information, true};
 }
 
-std::vector<TagSighting> TagSearch::find(const ImageF& picture, PixelLayout layout) {
-  check(picture.channels == 1 && layout != PixelLayout::rgb, "tags are sought in a mosaic or a mono picture");
+// What AprilTag finds, aligned. `hard`: at twice the size (grazing tags are a few pixels high) and as square roots,
+// which spend more of the eight bits on shadows; corners then are biased by up to half a pixel, and aligned again.
+std::vector<TagSighting> TagSearch::detect(TagDetector& detector, const ImageF& picture, PixelLayout layout,
+                                           bool hard) const {
+  const ImageF smooth = smooth_mosaic(picture);
+  const PixelBox lit = lit_box(smooth);
+  ImageF seen = cropped(smooth, lit);
+  if (hard) {
+    seen = twice_the_size(seen);
+    for (float& v : seen.data) v = std::sqrt(std::max(v, 0.F));
+  }
+  const double scale = hard ? 0.5 : 1;
   std::vector<TagSighting> found;
-  for (const TagDetection& tag : detector_.detect(smooth_mosaic(picture))) {
+  for (const TagDetection& tag : detector.detect(seen)) {
     if (!target_.corners_in_target.contains(tag.id) || !(signed_area(tag.corners_px) > 0)) continue;
+    TagCorners corners;
+    for (std::size_t k = 0; k < 4; ++k) corners[k] = scale * tag.corners_px[k] + Eigen::Vector2d(lit.x, lit.y);
     if (!options_.refine) {
-      found.push_back({tag.id, target_.corners_in_target.at(tag.id), tag.corners_px,
+      found.push_back({tag.id, target_.corners_in_target.at(tag.id), corners,
                        isotropic_information(options_.raw_sigma_px), true});
       continue;
     }
     constexpr double usual_blur_px = 0.7;
-    if (std::optional<TagSighting> s = align(picture, layout, tag.id, tag.corners_px, usual_blur_px))
-      found.push_back(*s);
+    if (std::optional<TagSighting> s = align(picture, layout, tag.id, corners, usual_blur_px)) found.push_back(*s);
   }
-  std::sort(found.begin(), found.end(), [](const TagSighting& a, const TagSighting& b) { return a.id < b.id; });
-  // The same id twice: one is a ghost, and nothing here says which.
-  for (std::size_t i = 0; i + 1 < found.size();) {
-    if (found[i].id != found[i + 1].id) {
-      ++i;
-      continue;
-    }
-    const int id = found[i].id;
-    std::erase_if(found, [id](const TagSighting& t) { return t.id == id; });
+  keep_unique(found);
+  if (in_one_plane(target_)) keep_consistent(found);
+  return found;
+}
+
+std::vector<TagSighting> TagSearch::find(const ImageF& picture, PixelLayout layout) {
+  check(picture.channels == 1 && layout != PixelLayout::rgb, "tags are sought in a mosaic or a mono picture");
+  if (picture.empty()) return {};
+  const std::size_t few = std::min(static_cast<std::size_t>(options_.few_tags), target_.corners_in_target.size());
+  std::vector<TagSighting> found = detect(detector_, picture, layout, false);
+  if (found.size() < few) {
+    std::vector<TagSighting> harder = detect(hard_detector_, picture, layout, true);
+    if (harder.size() > found.size()) found = std::move(harder);
   }
-  const bool plane = in_one_plane(target_);
-  if (plane) keep_consistent(found);
-  if (plane && options_.refine && options_.complete && !found.empty()) complete(picture, layout, found);
+  if (in_one_plane(target_) && options_.refine && options_.complete && !found.empty())
+    complete(picture, layout, found);
   return found;
 }
 

@@ -23,6 +23,7 @@ struct SearchedTarget {
 
 struct TagSearchOptions {
   double quad_decimate = 2;     // see TagDetectorOptions; tags that it misses are looked for where they must be
+  int few_tags = 4;             // with fewer than this, AprilTag looks again, at twice the size and in brighter shadows
   bool refine = true;           // align each tag's pattern with the picture; off: AprilTag's corners, for comparison
   bool complete = true;         // look for the target's other tags where those found say they are
   double raw_sigma_px = 0.3;    // what AprilTag's own corners are taken for, when refine is off
@@ -38,6 +39,7 @@ class TagSearch {
   [[nodiscard]] std::vector<TagSighting> find(const ImageF& picture, PixelLayout);
 
  private:
+  [[nodiscard]] std::vector<TagSighting> detect(TagDetector&, const ImageF& picture, PixelLayout, bool hard) const;
   void complete(const ImageF& picture, PixelLayout, std::vector<TagSighting>& found) const;
   [[nodiscard]] std::optional<TagSighting> align(const ImageF& picture, PixelLayout, int id, const TagCorners& start,
                                                  double initial_blur_px) const;
@@ -45,6 +47,7 @@ class TagSearch {
   SearchedTarget target_;
   TagSearchOptions options_;
   TagDetector detector_;
+  TagDetector hard_detector_;  // for small, grazing or dark tags
   std::map<int, TagPattern> patterns_;
 };
 
