@@ -30,7 +30,7 @@ struct AdjustedPose {
 struct Adjustment {
   CameraModel camera;
   Eigen::Matrix<double, CameraModel::parameter_count, CameraModel::parameter_count> camera_covariance;  // 0: held
-  std::vector<AdjustedPose> poses;  // one a view
+  std::vector<AdjustedPose> poses;                                                                      // one a view
   bool converged = false;
 };
 

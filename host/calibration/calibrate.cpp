@@ -23,8 +23,8 @@ namespace mf {
 namespace {
 
 constexpr double degrees = std::numbers::pi / 180;
-constexpr double chi2_8_median = 7.344;   // χ² with the eight degrees of a tag
-constexpr double chi2_8_outlier = 50;     // exceeded once in 2·10⁷
+constexpr double chi2_8_median = 7.344;  // χ² with the eight degrees of a tag
+constexpr double chi2_8_outlier = 50;    // exceeded once in 2·10⁷
 constexpr int fewest_tags_to_calibrate = 2;
 
 using Matrix8 = Eigen::Matrix<double, 8, 8>;
@@ -107,7 +107,8 @@ class Calibrator {
  public:
   Calibrator(const CalibrationInput& input, const CalibrationOptions& options, const Progress& progress)
       : input_(input), options_(options), progress_(progress) {
-    threads_ = options.threads > 0 ? options.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    threads_ =
+        options.threads > 0 ? options.threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   }
   CalibrationResult run();
 
@@ -155,12 +156,12 @@ void Calibrator::start() {
     if (work.homography && (work.view.inlier_count() >= enough_tags || well_seen < 3))
       homographies.push_back(*work.homography);
   if (homographies.empty())
-    throw InputError("calibration", "mirror frames",
+    throw InputError(input_.source, "mirror frames",
                      "no frame shows the target's tags: check that target.json is the frame in the pictures, and that "
                      "the tags are sharp and not overexposed");
   const std::optional<CameraModel> camera = zhang_intrinsics(homographies, input_.width, input_.height);
   if (!camera)
-    throw InputError("calibration", "mirror frames",
+    throw InputError(input_.source, "mirror frames",
                      fmt::format("the focal length cannot be found from {} frame(s): record some with the mirror "
                                  "tilted 30 degrees or more in different directions",
                                  homographies.size()));
@@ -198,7 +199,7 @@ std::vector<std::size_t> Calibrator::adjustable() const {
 void Calibrator::adjust() {
   const std::vector<std::size_t> chosen = adjustable();
   if (chosen.empty())
-    throw InputError("calibration", "mirror frames", "no frame's pose fits its tags: check target.json's sizes");
+    throw InputError(input_.source, "mirror frames", "no frame's pose fits its tags: check target.json's sizes");
   std::vector<TargetView> views;
   std::vector<Rigid3> poses;
   for (const std::size_t i : chosen) {
@@ -225,15 +226,14 @@ void Calibrator::judge_tags() {
   for (Work& work : works_)
     for (TagSighting& tag : work.view.tags) {
       tag.information /= factor;
-      if (work.pose)
-        tag.inlier = tag_chi2(adjustment_.camera, work.pose->cam_from_target, tag) < chi2_8_outlier;
+      if (work.pose) tag.inlier = tag_chi2(adjustment_.camera, work.pose->cam_from_target, tag) < chi2_8_outlier;
     }
 }
 
 // Wald's test of each group of terms against zero, the highest order first; true when something was dropped.
 bool Calibrator::drop_unseen_distortion() {
   static const std::vector<std::vector<int>> groups{{8}, {6, 7}, {4, 5}};  // k3; p1 p2; k1 k2
-  constexpr double significant = 25;  // five standard deviations
+  constexpr double significant = 25;                                       // five standard deviations
   for (const std::vector<int>& group : groups) {
     if (!free_distortion_[static_cast<std::size_t>(group[0] - 4)]) continue;
     Eigen::VectorXd value(static_cast<Eigen::Index>(group.size()));
@@ -332,9 +332,20 @@ CalibrationResult Calibrator::run() {
     squares += frame.inlier_corners * frame.rms_px * frame.rms_px;
     corners += frame.inlier_corners;
   }
+  if (corners == 0)
+    throw InputError(
+        input_.source, "mirror frames",
+        fmt::format("none of {} could be posed (the first: {}): check target.json and the light on the tags",
+                    out.frames.size(), out.frames.empty() ? "there is none" : out.frames.front().why_not));
   out.rms_px = corners > 0 ? std::sqrt(squares / corners) : 0;
   result.noise_factor = std::sqrt(variance_factor_);
   fill_world(out);
+  out.options = {{"distortion", distortion_choice_name(choice)},
+                 {"square_pixels", options_.square_pixels ? "true" : "false"},
+                 {"ransac_threshold_px", fmt::format("{}", options_.ransac_threshold_px)},
+                 {"model_error_px", fmt::format("{}", options_.model_error_px)},
+                 {"max_rotation_sigma_deg", fmt::format("{}", options_.max_rotation_sigma_deg)},
+                 {"max_position_sigma_m", fmt::format("{}", options_.max_position_sigma_m)}};
   report_progress(progress_, "calibrating", 1);
   return result;
 }
@@ -343,11 +354,16 @@ CalibrationResult Calibrator::run() {
 
 std::string distortion_choice_name(DistortionChoice choice) {
   switch (choice) {
-    case DistortionChoice::automatic: return "automatic";
-    case DistortionChoice::none: return "none";
-    case DistortionChoice::radial: return "radial";
-    case DistortionChoice::brown: return "brown";
-    case DistortionChoice::full: return "full";
+    case DistortionChoice::automatic:
+      return "automatic";
+    case DistortionChoice::none:
+      return "none";
+    case DistortionChoice::radial:
+      return "radial";
+    case DistortionChoice::brown:
+      return "brown";
+    case DistortionChoice::full:
+      return "full";
   }
   check(false, "every distortion choice has a name");
   return {};

@@ -34,8 +34,8 @@ struct Calibration {
   double world_rms_px = 0;
   double world_rotation_sigma_rad = 0;
   double world_position_sigma_m = 0;
-  double rms_px = 0;               // over all inlier corners of used frames
-  std::vector<MirrorPose> frames;  // every mirror frame of the session, in its order
+  double rms_px = 0;                           // over all inlier corners of used frames
+  std::vector<MirrorPose> frames;              // every mirror frame of the session, in its order
   std::map<std::string, std::string> options;  // what it was made with, for the record
 };
 

@@ -31,7 +31,8 @@ Eigen::Vector2d centre(const std::array<Eigen::Vector3d, 4>& corners) {
 
 // Where a missing tag must be, as the tags nearest to it say (a distorted picture is nearly projective over a few
 // tags); nothing when they don't say: all tags are then in one place, or it would face away.
-std::optional<TagCorners> predict(const std::vector<TagSighting>& found, const std::array<Eigen::Vector3d, 4>& corners) {
+std::optional<TagCorners> predict(const std::vector<TagSighting>& found,
+                                  const std::array<Eigen::Vector3d, 4>& corners) {
   constexpr std::size_t neighbours = 6;
   std::vector<const TagSighting*> near;
   for (const TagSighting& tag : found) near.push_back(&tag);
@@ -164,8 +165,8 @@ ImageF smooth_mosaic(const ImageF& mosaic) {
   const auto reflected = [](int i, int n) { return std::clamp(i < 0 ? -i : (i >= n ? 2 * n - 2 - i : i), 0, n - 1); };
   for (int y = 0; y < h; ++y)
     for (int x = 0; x < w; ++x)
-      across.at(x, y) = 0.25F * (mosaic.at(reflected(x - 1, w), y) + mosaic.at(reflected(x + 1, w), y)) +
-                        0.5F * mosaic.at(x, y);
+      across.at(x, y) =
+          0.25F * (mosaic.at(reflected(x - 1, w), y) + mosaic.at(reflected(x + 1, w), y)) + 0.5F * mosaic.at(x, y);
   for (int y = 0; y < h; ++y) {
     const std::span<const float> above = std::as_const(across).row(reflected(y - 1, h));
     const std::span<const float> here = std::as_const(across).row(y);
@@ -231,8 +232,8 @@ std::vector<TagSighting> TagSearch::detect(TagDetector& detector, const ImageF& 
     TagCorners corners;
     for (std::size_t k = 0; k < 4; ++k) corners[k] = scale * tag.corners_px[k] + Eigen::Vector2d(lit.x, lit.y);
     if (!options_.refine) {
-      found.push_back({tag.id, target_.corners_in_target.at(tag.id), corners,
-                       isotropic_information(options_.raw_sigma_px), true});
+      found.push_back(
+          {tag.id, target_.corners_in_target.at(tag.id), corners, isotropic_information(options_.raw_sigma_px), true});
       continue;
     }
     constexpr double usual_blur_px = 0.7;
@@ -252,8 +253,7 @@ std::vector<TagSighting> TagSearch::find(const ImageF& picture, PixelLayout layo
     std::vector<TagSighting> harder = detect(hard_detector_, picture, layout, true);
     if (harder.size() > found.size()) found = std::move(harder);
   }
-  if (in_one_plane(target_) && options_.refine && options_.complete && !found.empty())
-    complete(picture, layout, found);
+  if (in_one_plane(target_) && options_.refine && options_.complete && !found.empty()) complete(picture, layout, found);
   return found;
 }
 

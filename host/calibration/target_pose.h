@@ -32,7 +32,8 @@ struct CornerDerivative {
 inline constexpr double tag_huber_width = 5.1;
 
 // Pose from the homography of a plane of the target, z = const (Zhang 2000, §3.1). `point_in_target` lies in that plane
-// and was seen: it fixes the side of the camera. The camera's distortion is ignored; this is a start for estimate_pose().
+// and was seen: it fixes the side of the camera. The camera's distortion is ignored; this is a start for
+// estimate_pose().
 [[nodiscard]] std::optional<Rigid3> pose_from_homography(const Homography& picture_from_plane,
                                                          const Eigen::Vector3d& point_in_target, const CameraModel&);
 

@@ -20,6 +20,7 @@ int run(int argc, char** argv) {
   program.require_subcommand(1);
   program.set_version_flag("--version", MIRRORFIELD_VERSION);
   mf::add_import_command(program);
+  mf::add_calibrate_command(program);
   mf::add_render_command(program);
   mf::add_composite_command(program);
   try {
