@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,8 +32,11 @@ struct Calibration {
   CameraModel::Parameters camera_sigma{};  // one standard deviation, parameter by parameter
   std::optional<Rigid3> cam_from_world;    // nothing when the session has no world tags
   double world_rms_px = 0;
-  double rms_px = 0;               // over all inlier corners of used frames
-  std::vector<MirrorPose> frames;  // every mirror frame of the session, in its order
+  double world_rotation_sigma_rad = 0;
+  double world_position_sigma_m = 0;
+  double rms_px = 0;                           // over all inlier corners of used frames
+  std::vector<MirrorPose> frames;              // every mirror frame of the session, in its order
+  std::map<std::string, std::string> options;  // what it was made with, for the record
 };
 
 // Both throw InputError naming file and field.

@@ -47,7 +47,7 @@ struct State {
   Noise noise;
 };
 
-struct Sample {  // one pixel of the tag under the current state
+struct Sample {         // one pixel of the tag under the current state
   Eigen::Vector2d at;   // pixel − centre
   Eigen::Vector2d tag;  // u, v
   int colour = 0;
@@ -56,7 +56,7 @@ struct Sample {  // one pixel of the tag under the current state
   Eigen::RowVector2d model_gradient;  // per pixel
 };
 
-constexpr double flat = 1e-3;  // model per pixel: inside a cell a pixel tells of the light only
+constexpr double flat = 1e-3;                // model per pixel: inside a cell a pixel tells of the light only
 constexpr double outer_margin_cells = 0.45;  // of the outermost ring: what lies beyond it is not known
 
 class Alignment {
@@ -332,7 +332,7 @@ std::optional<RefinedTag> refine_tag(const ImageF& picture, PixelLayout layout, 
   Alignment alignment(picture, layout, pattern, start);
   if (!alignment.begin(start, options.initial_blur_px)) return std::nullopt;
   constexpr double converged_px = 0.01;  // a tenth of what the noise leaves open
-  constexpr int held_blur_steps = 2;      // until the edges overlap, blur would only grow to bridge the gap
+  constexpr int held_blur_steps = 2;     // until the edges overlap, blur would only grow to bridge the gap
   bool converged = false;
   for (int i = 0; i < options.max_iterations && !converged; ++i) {
     const std::optional<double> moved = alignment.step(i >= held_blur_steps);

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "common/error.h"
+#include "common/response_curve.h"
+#include "common/session.h"
+#include "host/calibration/calibrate.h"
+#include "host/calibration/colmap_export.h"
+#include "host/calibration/session_targets.h"
+#include "host/cli/command.h"
+
+namespace mf {
+
+namespace {
+
+struct Arguments {
+  std::filesystem::path session;
+  std::filesystem::path colmap;
+  CalibrationOptions options;
+  bool json = false;
+};
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Linear-float frames need no response: they are proportional to light already.
+ResponseCurve response_of(const SessionReader& session) {
+  const std::filesystem::path file = session.folder() / "response.json";
+  if (std::filesystem::exists(file)) return read_response_curve(file);
+  if (session.header().format.linear_float) return {};
+  throw InputError(file.string(), "",
+                   fmt::format("is missing: run `mirrorfield photometry {}` first, tags are found in linearized frames",
+                               session.folder().string()));
+}
+
+nlohmann::json summary_of(const CalibrationResult& result) {
+  const Calibration& c = result.calibration;
+  nlohmann::json unposed = nlohmann::json::array();
+  for (const MirrorPose& frame : c.frames)
+    if (!frame.used) unposed.push_back({{"name", frame.name}, {"why_not", frame.why_not}});
+  static constexpr std::array<const char*, CameraModel::parameter_count> names{"fx", "fy", "cx", "cy", "k1",
+                                                                               "k2", "p1", "p2", "k3"};
+  nlohmann::json parameters, sigma;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    parameters[names[i]] = c.camera.parameters[i];
+    sigma[names[i]] = c.camera_sigma[i];
+  }
+  nlohmann::json json{{"frames", c.frames.size()},
+                      {"used", c.frames.size() - unposed.size()},
+                      {"rms_px", c.rms_px},
+                      {"camera", parameters},
+                      {"sigma", sigma},
+                      {"K", {{c.camera.fx(), 0, c.camera.cx()}, {0, c.camera.fy(), c.camera.cy()}, {0, 0, 1}}},
+                      {"tags", result.tags},
+                      {"outlier_tags", result.outlier_tags},
+                      {"noise_factor", result.noise_factor},
+                      {"unposed", unposed}};
+  if (c.cam_from_world) json["world_rms_px"] = c.world_rms_px;
+  return json;
+}
+
+std::string text_of(const CalibrationResult& result, const nlohmann::json& summary) {
+  const Calibration& c = result.calibration;
+  std::string text =
+      fmt::format("{} of {} frames posed; {} tags, {} of them outliers; reprojection {:.3f} px RMS\n",
+                  summary["used"].get<int>(), c.frames.size(), result.tags, result.outlier_tags, c.rms_px);
+  text += fmt::format("fx {:.2f} ± {:.2f}  fy {:.2f} ± {:.2f}  cx {:.2f} ± {:.2f}  cy {:.2f} ± {:.2f}\n", c.camera.fx(),
+                      c.camera_sigma[0], c.camera.fy(), c.camera_sigma[1], c.camera.cx(), c.camera_sigma[2],
+                      c.camera.cy(), c.camera_sigma[3]);
+  if (c.camera.has_distortion())
+    text += fmt::format("k1 {:.5f}  k2 {:.5f}  p1 {:.6f}  p2 {:.6f}  k3 {:.5f}\n", c.camera.parameters[4],
+                        c.camera.parameters[5], c.camera.parameters[6], c.camera.parameters[7], c.camera.parameters[8]);
+  else
+    text += "no lens distortion that the pictures show\n";
+  text += c.cam_from_world ? fmt::format("world frame: {:.3f} px RMS\n", c.world_rms_px)
+                           : "no world frame: no scene picture shows the world's tags\n";
+  for (const nlohmann::json& frame : summary["unposed"])
+    text += fmt::format("not used: {}: {}\n", frame["name"].get<std::string>(), frame["why_not"].get<std::string>());
+  return text;
+}
+
+void run(const Arguments& arguments) {
+  if (const std::optional<std::string> fault = arguments.options.validate()) throw InputError("options", "", *fault);
+  const Progress progress = progress_bar();
+  const SessionReader session(arguments.session);
+  const ResponseCurve response = response_of(session);
+  auto start = std::chrono::steady_clock::now();
+  const CalibrationInput input =
+      find_session_targets(session, response, TagSearchOptions{}, arguments.options.threads, progress);
+  const double seconds_finding = seconds_since(start);
+  start = std::chrono::steady_clock::now();
+  const CalibrationResult result = calibrate(input, arguments.options, progress);
+  const double seconds_calibrating = seconds_since(start);
+  write_calibration(session.folder() / "calibration.json", result.calibration);
+  nlohmann::json summary = summary_of(result);
+  summary["seconds"] = {{"finding tags", seconds_finding}, {"calibrating", seconds_calibrating}};
+  std::string text = text_of(result, summary);
+  if (!arguments.colmap.empty()) {
+    start = std::chrono::steady_clock::now();
+    const ColmapSummary exported = export_colmap(arguments.colmap, result.calibration, session, response, progress);
+    summary["seconds"]["exporting"] = seconds_since(start);
+    summary["colmap_images"] = exported.images;
+    text += fmt::format("{}: COLMAP model of {} views\n", arguments.colmap.string(), exported.images);
+  }
+  print_summary(arguments.json, summary, text);
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "calibrate", "the camera, the mirror's pose in every frame and the world frame, from tags: calibration.json");
+  // Shared: the callback outlives this function, and CLI11 copies it.
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("session", arguments->session, "the session's folder, with response.json")->required();
+  command->add_option("--export-colmap", arguments->colmap, "also write a COLMAP text model with its pictures here");
+  static const std::map<std::string, DistortionChoice> choices{{"automatic", DistortionChoice::automatic},
+                                                               {"none", DistortionChoice::none},
+                                                               {"radial", DistortionChoice::radial},
+                                                               {"brown", DistortionChoice::brown},
+                                                               {"full", DistortionChoice::full}};
+  command
+      ->add_option("--distortion", arguments->options.distortion,
+                   "lens terms to estimate: automatic (what the pictures show), none, radial (k1 k2), brown (k1 k2 p1 "
+                   "p2), full (and k3)")
+      ->transform(CLI::CheckedTransformer(choices))
+      ->default_str("automatic");
+  command->add_flag("--square-pixels", arguments->options.square_pixels, "fx = fy");
+  command
+      ->add_option("--max-rotation-sigma-deg", arguments->options.max_rotation_sigma_deg,
+                   "a frame less certain than this is not used")
+      ->capture_default_str();
+  command
+      ->add_option("--max-position-sigma-m", arguments->options.max_position_sigma_m,
+                   "a frame less certain than this is not used")
+      ->capture_default_str();
+  command->add_option("--threads", arguments->options.threads, "0: as many as the machine has")->capture_default_str();
+  add_json_flag(*command, arguments->json);
+  command->callback([arguments] { run(*arguments); });
+}
+
+}  // namespace mf
