@@ -21,6 +21,9 @@ int run(int argc, char** argv) {
   program.set_version_flag("--version", MIRRORFIELD_VERSION);
   mf::add_import_command(program);
   mf::add_photometry_command(program);
+  mf::add_render_command(program);
+  mf::add_composite_command(program);
+  mf::add_probe_command(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -10,7 +10,6 @@
 #include "common/session.h"
 #include "host/cli/command.h"
 #include "host/cli/run_resample.h"
-#include "host/light_field/view_rays.h"
 
 namespace mf {
 
@@ -28,17 +27,14 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-nlohmann::json radius_to_json(const FieldProxy& proxy) {
-  return std::isinf(proxy.radius_m) ? nlohmann::json("inf") : nlohmann::json(proxy.radius_m);
-}
-
 nlohmann::json summarize(const ResampleResult& r) {
   nlohmann::json scores = nlohmann::json::array();
-  for (const ProxyScore& s : r.proxy_scores)
-    scores.push_back({{"radius_m", radius_to_json(s.proxy)}, {"inconsistency_stops", s.inconsistency}});
+  for (const SphereScore& s : r.sphere_scores)
+    scores.push_back({{"radius_m", std::isinf(s.radius_m) ? nlohmann::json("inf") : nlohmann::json(s.radius_m)},
+                      {"inconsistency_stops", s.inconsistency}});
   const PlaneRectangle& plane = r.field.plane;
-  return {{"proxy", proxy_name(r.field.proxy)},
-          {"proxy_scores", scores},
+  return {{"proxy", surroundings_name(r.field.surroundings)},
+          {"sphere_scores", scores},
           {"directions", r.field.directions.size()},
           {"size", r.field.resolution},
           {"views", r.views},
@@ -57,8 +53,8 @@ void run(Arguments& a) {
       a.json, summarize(r),
       fmt::format(
           "{} views → {} directions × {}² texels over {:.2f} × {:.2f} m, proxy {}, mean confidence {:.2f}\n{}\n",
-          r.views, r.field.directions.size(), r.field.resolution, size.x(), size.y(), proxy_name(r.field.proxy),
-          r.mean_confidence, a.output.string()));
+          r.views, r.field.directions.size(), r.field.resolution, size.x(), size.y(),
+          surroundings_name(r.field.surroundings), r.mean_confidence, a.output.string()));
 }
 
 }  // namespace
@@ -108,7 +104,8 @@ void add_resample_command(CLI::App& program) {
       ->capture_default_str();
   command
       ->add_option("--proxy", a->options.proxy,
-                   "what the views are focused on: auto, plane, sphere:R (metres), sphere:inf")
+                   "what the views are focused on: auto (a distance per direction), sphere (the best radius), sphere:R "
+                   "(metres), sphere:inf, plane")
       ->capture_default_str();
   command->add_option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)")
       ->capture_default_str();

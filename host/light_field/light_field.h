@@ -8,6 +8,7 @@
 
 #include "common/rigid3.h"
 #include "host/light_field/direction_set.h"
+#include "host/light_field/surroundings.h"
 
 namespace mf {
 
@@ -20,12 +21,6 @@ struct PlaneRectangle {
   [[nodiscard]] Eigen::Vector2d size_m() const { return max_m - min_m; }
 };
 
-// The surroundings on which the views were focused: a sphere about the rectangle's centre. 0: the plane itself was the
-// proxy; infinity: distant surroundings.
-struct FieldProxy {
-  double radius_m = 0;
-};
-
 // The light that arrives at a plane: L(p, ω), linear radiance in BT.709 primaries, ω pointing from p to the light.
 //
 // For every direction a tile of resolution² texels over the rectangle; texel (0, 0) is at (min x, max y): a tile seen
@@ -35,7 +30,7 @@ struct FieldProxy {
 struct LightField {
   PlaneRectangle plane;
   DirectionSet directions;
-  FieldProxy proxy;
+  Surroundings surroundings;  // on which the views were focused
   int resolution = 0;
   bool absolute = false;     // radiance is in the units of the reference reading
   std::string options_json;  // the options that made it

@@ -2,17 +2,21 @@
 #include <ImathMatrix.h>
 #include <ImathVec.h>
 #include <ImfChannelList.h>
-#include <ImfDoubleAttribute.h>
 #include <ImfFloatVectorAttribute.h>
 #include <ImfFrameBuffer.h>
+#include <ImfInputPart.h>
 #include <ImfIntAttribute.h>
 #include <ImfMatrixAttribute.h>
+#include <ImfMultiPartInputFile.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputPart.h>
+#include <ImfPartType.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <ImfThreading.h>
 #include <ImfTileDescriptionAttribute.h>
-#include <ImfTiledInputFile.h>
-#include <ImfTiledOutputFile.h>
+#include <ImfTiledInputPart.h>
+#include <ImfTiledOutputPart.h>
 #include <ImfVecAttribute.h>
 #include <fmt/format.h>
 #include <half.h>
@@ -76,12 +80,13 @@ Imf::Header header_of(const LightField& field) {
   header.setTileDescription(
       Imf::TileDescription(static_cast<unsigned>(field.resolution), static_cast<unsigned>(field.resolution)));
   header.compression() = Imf::ZIP_COMPRESSION;
+  header.setName("field");
+  header.setType(Imf::TILEDIMAGE);
   Imf::addChromaticities(header, Imf::Chromaticities());  // BT.709
   header.insert("mfVersion", Imf::IntAttribute(format_version));
   header.insert("mfResolution", Imf::IntAttribute(field.resolution));
   header.insert("mfFrequency", Imf::IntAttribute(field.directions.frequency));
   header.insert("mfAbsolute", Imf::IntAttribute(field.absolute ? 1 : 0));
-  header.insert("mfProxyRadius", Imf::DoubleAttribute(field.proxy.radius_m));
   header.insert("mfOptions", Imf::StringAttribute(field.options_json));
   const Eigen::Matrix4d m = field.plane.world_from_plane.matrix();
   Imath::M44d rows;
@@ -125,7 +130,6 @@ LightField field_without_texels(const Imf::Header& header, const std::string& fi
     throw InputError(file, "mfVersion", fmt::format("is not {}: resample again with this version", format_version));
   field.resolution = attribute<Imf::IntAttribute>(header, "mfResolution", file);
   field.absolute = attribute<Imf::IntAttribute>(header, "mfAbsolute", file) != 0;
-  field.proxy.radius_m = attribute<Imf::DoubleAttribute>(header, "mfProxyRadius", file);
   field.options_json = attribute<Imf::StringAttribute>(header, "mfOptions", file);
   const Imath::M44d& rows = attribute<Imf::M44dAttribute>(header, "mfWorldFromPlane", file);
   Eigen::Matrix4d m;
@@ -148,6 +152,114 @@ LightField field_without_texels(const Imf::Header& header, const std::string& fi
   return field;
 }
 
+// ---- the texels ----
+
+void write_tiles(Imf::MultiPartOutputFile& file, const LightField& field) {
+  Imf::TiledOutputPart out(file, 0);
+  const int columns = atlas_columns(field.directions.size()), n = field.resolution;
+  TileRow row(columns, n);
+  for (int r = 0; r < atlas_rows(field.directions.size()); ++r) {
+    row.clear();
+    for (int c = 0; c < columns; ++c) {
+      const std::size_t direction =
+          static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
+      if (direction >= field.directions.size()) break;
+      const Eigen::Vector4f* tile = field.tile(direction);
+      for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x)
+          for (int i = 0; i < 4; ++i)
+            row.texel(c, x, y)[i] = half(std::min(tile[y * n + x][i], 65504.0F));  // largest half
+    }
+    out.setFrameBuffer(row.frame_buffer(r));
+    out.writeTiles(0, columns - 1, r, r);
+  }
+}
+
+void read_tiles(Imf::MultiPartInputFile& file, LightField& field) {
+  Imf::TiledInputPart in(file, 0);
+  field.rgbc.resize(field.directions.size() * field.texel_count());
+  const int columns = atlas_columns(field.directions.size()), n = field.resolution;
+  TileRow row(columns, n);
+  for (int r = 0; r < atlas_rows(field.directions.size()); ++r) {
+    in.setFrameBuffer(row.frame_buffer(r));
+    in.readTiles(0, columns - 1, r, r);
+    for (int c = 0; c < columns; ++c) {
+      const std::size_t direction =
+          static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
+      if (direction >= field.directions.size()) break;
+      Eigen::Vector4f* tile = field.tile(direction);
+      for (int y = 0; y < n; ++y)
+        for (int x = 0; x < n; ++x)
+          for (int i = 0; i < 4; ++i) tile[y * n + x][i] = static_cast<float>(row.texel(c, x, y)[i]);
+    }
+  }
+}
+
+// ---- the surroundings: one part a map ----
+
+struct NamedMap {
+  const char* name;
+  std::vector<const char*> channels;
+  const ImageF* map;
+};
+
+std::vector<NamedMap> maps_of(const Surroundings& s) {
+  std::vector<NamedMap> maps;
+  if (!s.inverse_distance.empty()) maps.push_back({"inverseDistance", {"Y"}, &s.inverse_distance});
+  if (!s.confidence.empty()) maps.push_back({"distanceConfidence", {"Y"}, &s.confidence});
+  if (!s.panorama.empty()) maps.push_back({"panorama", {"R", "G", "B", "A"}, &s.panorama});
+  return maps;
+}
+
+// All parts of a file share the display window: the field's.
+Imf::Header header_of(const NamedMap& map, const Surroundings& s, const Imath::Box2i& display_window) {
+  Imf::Header header(display_window, Imath::Box2i({0, 0}, {map.map->width - 1, map.map->height - 1}));
+  header.setName(map.name);
+  header.setType(Imf::SCANLINEIMAGE);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  Imf::addChromaticities(header, Imf::Chromaticities());
+  for (const char* channel : map.channels) header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+  header.insert("mfCentre", Imf::V3fAttribute({s.centre_in_world.x(), s.centre_in_world.y(), s.centre_in_world.z()}));
+  return header;
+}
+
+Imf::FrameBuffer frame_buffer(const std::vector<const char*>& channels, const ImageF& map) {
+  Imf::FrameBuffer buffer;
+  // OpenEXR writes through the same type that it reads into: the pixels are not changed on writing.
+  char* base = const_cast<char*>(reinterpret_cast<const char*>(map.data.data()));
+  const std::size_t pixel = sizeof(float) * channels.size();
+  for (std::size_t c = 0; c < channels.size(); ++c)
+    buffer.insert(channels[c],
+                  Imf::Slice(Imf::FLOAT, base + c * sizeof(float), pixel, pixel * static_cast<std::size_t>(map.width)));
+  return buffer;
+}
+
+void write_map(Imf::MultiPartOutputFile& file, int part, const NamedMap& map) {
+  Imf::OutputPart out(file, part);
+  out.setFrameBuffer(frame_buffer(map.channels, *map.map));
+  out.writePixels(map.map->height);
+}
+
+ImageF read_map(Imf::MultiPartInputFile& file, int part, const std::vector<const char*>& channels) {
+  Imf::InputPart in(file, part);
+  const Imath::Box2i window = in.header().dataWindow();
+  ImageF map(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, static_cast<int>(channels.size()));
+  in.setFrameBuffer(frame_buffer(channels, map));
+  in.readPixels(window.min.y, window.max.y);
+  return map;
+}
+
+void read_surroundings(Imf::MultiPartInputFile& file, Surroundings& s, const std::string& path) {
+  for (int part = 1; part < file.parts(); ++part) {
+    const std::string name = file.header(part).name();
+    const Imath::V3f& centre = attribute<Imf::V3fAttribute>(file.header(part), "mfCentre", path);
+    s.centre_in_world = {centre.x, centre.y, centre.z};
+    if (name == "inverseDistance") s.inverse_distance = read_map(file, part, {"Y"});
+    if (name == "distanceConfidence") s.confidence = read_map(file, part, {"Y"});
+    if (name == "panorama") s.panorama = read_map(file, part, {"R", "G", "B", "A"});
+  }
+}
+
 void use_all_cores() {
   Imf::setGlobalThreadCount(static_cast<int>(std::max(1U, std::thread::hardware_concurrency())));
 }
@@ -158,24 +270,13 @@ void write_light_field(const std::filesystem::path& path, const LightField& fiel
   use_all_cores();
   AtomicFile file(path);
   try {
-    Imf::TiledOutputFile out(file.path().c_str(), header_of(field));
-    const int columns = atlas_columns(field.directions.size()), n = field.resolution;
-    TileRow row(columns, n);
-    for (int r = 0; r < atlas_rows(field.directions.size()); ++r) {
-      row.clear();
-      for (int c = 0; c < columns; ++c) {
-        const std::size_t direction =
-            static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
-        if (direction >= field.directions.size()) break;
-        const Eigen::Vector4f* tile = field.tile(direction);
-        for (int y = 0; y < n; ++y)
-          for (int x = 0; x < n; ++x)
-            for (int i = 0; i < 4; ++i)
-              row.texel(c, x, y)[i] = half(std::min(tile[y * n + x][i], 65504.0F));  // largest half
-      }
-      out.setFrameBuffer(row.frame_buffer(r));
-      out.writeTiles(0, columns - 1, r, r);
-    }
+    std::vector<Imf::Header> headers{header_of(field)};
+    for (const NamedMap& map : maps_of(field.surroundings))
+      headers.push_back(header_of(map, field.surroundings, headers.front().displayWindow()));
+    Imf::MultiPartOutputFile out(file.path().c_str(), headers.data(), static_cast<int>(headers.size()));
+    write_tiles(out, field);
+    int part = 1;
+    for (const NamedMap& map : maps_of(field.surroundings)) write_map(out, part++, map);
   } catch (const std::exception& e) {
     throw InputError(
         path.string(), "",
@@ -187,24 +288,10 @@ void write_light_field(const std::filesystem::path& path, const LightField& fiel
 LightField read_light_field(const std::filesystem::path& path) {
   use_all_cores();
   try {
-    Imf::TiledInputFile in(path.c_str());
-    LightField field = field_without_texels(in.header(), path.string());
-    field.rgbc.resize(field.directions.size() * field.texel_count());
-    const int columns = atlas_columns(field.directions.size()), n = field.resolution;
-    TileRow row(columns, n);
-    for (int r = 0; r < atlas_rows(field.directions.size()); ++r) {
-      in.setFrameBuffer(row.frame_buffer(r));
-      in.readTiles(0, columns - 1, r, r);
-      for (int c = 0; c < columns; ++c) {
-        const std::size_t direction =
-            static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
-        if (direction >= field.directions.size()) break;
-        Eigen::Vector4f* tile = field.tile(direction);
-        for (int y = 0; y < n; ++y)
-          for (int x = 0; x < n; ++x)
-            for (int i = 0; i < 4; ++i) tile[y * n + x][i] = static_cast<float>(row.texel(c, x, y)[i]);
-      }
-    }
+    Imf::MultiPartInputFile in(path.c_str());
+    LightField field = field_without_texels(in.header(0), path.string());
+    read_tiles(in, field);
+    read_surroundings(in, field.surroundings, path.string());
     return field;
   } catch (const InputError&) {
     throw;

@@ -10,16 +10,31 @@
 
 namespace mf {
 
+// The ray of the field that stands for a ray in the world.
+struct FieldRay {
+  Eigen::Vector2f p_in_plane;  // where it crosses the plane, inside the rectangle
+  Eigen::Vector3f direction;   // plane frame, unit
+};
+
 // Looks a light field up along any ray. Keeps references: the field outlives it.
 class FieldSampler {
  public:
   explicit FieldSampler(const LightField&);
 
-  // Radiance that arrives at x from `direction` (world frame, unit; from x towards the light) and its confidence.
-  // Parallax: the ray is followed to the point p where it crosses the plane; between directions the three nearest are
-  // interpolated. A ray that crosses outside the rectangle is replaced by the one from the rectangle's nearest point to
-  // where the ray meets the proxy. Zero, with confidence 0, for rays that come from below the plane.
-  [[nodiscard]] Eigen::Vector4f radiance(const Eigen::Vector3d& x_in_world, const Eigen::Vector3d& direction) const;
+  // Parallax: the ray from x towards `direction` (world, unit) is followed to the point p where it crosses the plane.
+  // When that lies outside the rectangle, the ray is replaced by the one from the rectangle's nearest point to where it
+  // meets the surroundings. Nothing for rays that come from below the plane.
+  [[nodiscard]] std::optional<FieldRay> field_ray(const Eigen::Vector3d& x_in_world,
+                                                  const Eigen::Vector3d& direction) const;
+
+  // Radiance and confidence, interpolated between the three nearest directions.
+  [[nodiscard]] Eigen::Vector4f radiance(const FieldRay&) const;
+
+  // The direction in which the surroundings' centre sees what the ray meets; world frame. Precondition: not the plane
+  // proxy.
+  [[nodiscard]] Eigen::Vector3f seen_from_centre(const FieldRay&) const;
+
+  [[nodiscard]] const DirectionLocator& locator() const { return locator_; }
 
  private:
   const LightField& field_;
@@ -43,7 +58,10 @@ struct Probe {
   ImageF radiance;    // RGB, width × width/2
   ImageF confidence;  // one channel, 0…1
 };
-// The light at one point as a lat-long picture. Precondition: width even, ≥ 4.
+// The light at one point as a lat-long picture. The field gives each cell's light at that point; within a cell the
+// picture follows the surroundings' panorama (the field has some 3° between directions, the panorama a third of a
+// degree), scaled so that the cell keeps its mean. Zero, with confidence 0, where no view looked and below the plane.
+// Precondition: width even, ≥ 4.
 [[nodiscard]] Probe make_probe(const LightField&, const Eigen::Vector3d& at_in_world, LatLongConvention, int width);
 
 }  // namespace mf

@@ -2,23 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
-#include <string>
-#include <string_view>
-
 #include "host/light_field/field_views.h"
-#include "host/light_field/light_field.h"
 
 namespace mf {
-
-// "plane" → 0, "sphere:2.5" → 2.5, "sphere:inf" → infinity. Nothing for anything else or a radius that is not positive.
-[[nodiscard]] std::optional<FieldProxy> parse_proxy(std::string_view);
-[[nodiscard]] std::string proxy_name(const FieldProxy&);
-
-// 1 / distance along the ray from p towards ω at which it meets a sphere of the radius about `centre` (p inside); 0
-// when the surroundings are distant. All in one frame, metres.
-[[nodiscard]] float inverse_distance_to_sphere(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
-                                               const Eigen::Vector3f& centre, double radius_m);
 
 // A point of the proxy, homogeneous and in the world: (ω + s p, s) for the ray from p towards ω that meets the proxy at
 // the distance 1/s; s = 0 is a direction.

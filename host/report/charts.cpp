@@ -21,10 +21,10 @@ constexpr double right = width - 12;
 constexpr double top = 12;
 constexpr double bottom = height - 44;
 
-// One axis: data values to drawing positions, and where its ticks are.
+// One axis: data values to drawing positions, and where its ticks are. `round_up`: it ends at a tick.
 class Axis {
  public:
-  Axis(double low, double high, bool log, double from, double to) : log_(log), from_(from), to_(to) {
+  Axis(double low, double high, bool log, bool round_up, double from, double to) : log_(log), from_(from), to_(to) {
     if (log_) {
       low_ = std::floor(std::log10(low));
       high_ = std::max(low_ + 1, std::ceil(std::log10(high)));
@@ -38,14 +38,13 @@ class Axis {
     double step = 10 * decade;
     for (const double multiple : {1.0, 2.0, 5.0})
       if (step > 9.99 * decade && multiple * decade >= rough) step = multiple * decade;
-    high_ = std::ceil(high / step - 1e-9) * step;
+    high_ = round_up ? std::ceil(high / step - 1e-9) * step : high;
     for (double t = std::ceil(low / step) * step; t <= high_ + 1e-9 * step; t += step) ticks_.push_back(t);
   }
   [[nodiscard]] double at(double value) const {
     const double v = log_ ? std::log10(value) : value;
     return from_ + (v - low_) / (high_ - low_) * (to_ - from_);
   }
-  [[nodiscard]] bool shows(double value) const { return std::isfinite(value) && (!log_ || value > 0); }
   [[nodiscard]] const std::vector<double>& ticks() const { return ticks_; }
 
  private:
@@ -95,8 +94,8 @@ std::string line_chart(const std::vector<ChartSeries>& series, const ChartAxes& 
         high.at(k) = std::max(high.at(k), p.at(k));
       }
   if (!(low[0] <= high[0])) return "<p>Nothing to draw.</p>";
-  const Axis x(low[0], high[0], axes.log_x, left, right);
-  const Axis y(low[1], high[1], axes.log_y, bottom, top);
+  const Axis x(low[0], high[0], axes.log_x, false, left, right);
+  const Axis y(low[1], high[1], axes.log_y, true, bottom, top);
   std::string content = frame_and_ticks(x, y, axes.x_label, axes.y_label);
   for (const ChartSeries& s : series) {
     content += fmt::format(R"(<polyline class="{}" points=")", s.css_class);
@@ -113,8 +112,8 @@ std::string bar_chart(const std::vector<Bar>& bars, const std::string& x_label, 
   double highest = std::max(reference, 1e-6);
   for (const Bar& b : bars)
     if (b.good) highest = std::max(highest, b.value);
-  const Axis x(0, static_cast<double>(bars.size()), false, left, right);
-  const Axis y(0, highest, false, bottom, top);
+  const Axis x(0, static_cast<double>(bars.size()), false, false, left, right);
+  const Axis y(0, highest, false, true, bottom, top);
   std::string content = frame_and_ticks(x, y, x_label, y_label);
   for (std::size_t i = 0; i < bars.size(); ++i) {
     const double x0 = x.at(static_cast<double>(i));

@@ -16,7 +16,7 @@ section > p { margin: .2rem 0 .8rem; max-width: 48rem; opacity: .85; }
 .tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(10rem, 1fr)); gap: .6rem; }
 .tile { background: var(--soft); border-radius: .5rem; padding: .6rem .8rem; }
 .tile b { display: block; font-size: 1.15rem; } .tile span { font-size: .85rem; opacity: .85; }
-.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(100%, 18rem), 1fr)); gap: .8rem; }
+.grid { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(46%, 18rem), 1fr)); gap: .8rem; }
 .grid.wide { grid-template-columns: repeat(auto-fit, minmax(min(100%, 26rem), 1fr)); align-items: start; }
 figure { margin: 0; } figcaption { font-size: .85rem; opacity: .85; }
 img, svg { display: block; width: 100%; height: auto; } img { image-rendering: auto; border-radius: .3rem; }

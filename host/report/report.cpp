@@ -31,8 +31,9 @@ std::string figure(const std::string& picture, const std::string& caption) {
   return fmt::format("<figure>{}<figcaption>{}</figcaption></figure>", picture, html_escaped(caption));
 }
 
-std::string picture(const ImageU8& image, const std::string& alt) {
-  return fmt::format(R"(<img alt="{}" width="{}" height="{}" src="{}">)", html_escaped(alt), image.width, image.height,
+// `aspect`: width over height as shown.
+std::string picture(const ImageU8& image, const std::string& alt, double aspect) {
+  return fmt::format(R"(<img alt="{}" style="aspect-ratio:{:.4f}" src="{}">)", html_escaped(alt), aspect,
                      png_data_uri(image));
 }
 
@@ -49,7 +50,6 @@ std::string summary(const ReportInput& in) {
   const std::size_t used = used_count(in.calibration);
   const std::size_t all = in.calibration.frames.size();
   const CameraModel& camera = in.calibration.camera;
-  const ImageF irradiance = irradiance_map(in.field);
   const Eigen::Vector2d size = in.field.plane.size_m();
   std::string tiles;
   tiles += tile(fmt::format("{} / {}", used, all), "frames posed");
@@ -59,11 +59,7 @@ std::string summary(const ReportInput& in) {
       tile(fmt::format("{:.0f} %", 100 * covered_share(in.field)), "of the light's directions seen (cosine-weighted)");
   tiles += tile(fmt::format("{} × {}²", in.field.directions.size(), in.field.resolution), "directions × texels");
   tiles += tile(fmt::format("{:.2f} × {:.2f} m", size.x(), size.y()), "plane");
-  const double radius = in.field.proxy.radius_m;
-  tiles += tile(radius == 0          ? "the plane"
-                : std::isinf(radius) ? "infinity"
-                                     : fmt::format("{:.2f} m", radius),
-                "focused on surroundings at");
+  tiles += tile(surroundings_name(in.field.surroundings), "focused on");
   tiles += tile(in.response.absolute ? "absolute" : "relative", "radiance scale");
   return "<div class=\"tiles\">" + tiles + "</div>\n";
 }
@@ -169,8 +165,8 @@ std::string hemisphere(const ReportInput& in) {
       "The hemisphere above the plane: zenith in the middle, horizon at the rim, +x right, +y up, equal areas "
       "for equal solid angles.",
       "<div class=\"grid\">" +
-          figure(picture(coverage, "coverage"), "Coverage: blue seen from the whole plane, orange from nowhere") +
-          figure(picture(light, "light"), "The light itself, mean over the plane") + "</div>");
+          figure(picture(coverage, "coverage", 1), "Coverage: blue seen from the whole plane, orange from nowhere") +
+          figure(picture(light, "light", 1), "The light itself, mean over the plane") + "</div>");
 }
 
 std::string light(const ReportInput& in) {
@@ -182,6 +178,7 @@ std::string light(const ReportInput& in) {
     highest = std::max(highest, static_cast<double>(map.data[i]));
   }
   const Eigen::Vector3d& at = in.probe_at_in_world;
+  const Eigen::Vector2d size = in.field.plane.size_m();
   const std::string probe_caption = fmt::format(
       "The light at ({:.2f}, {:.2f}, {:.2f}) m: what a mirror ball would see. Black: below the plane or never seen",
       at.x(), at.y(), at.z());
@@ -189,8 +186,9 @@ std::string light(const ReportInput& in) {
       fmt::format("Irradiance over the plane, +x right, +y up: green from {:.3g} to {:.3g}", lowest, highest);
   return section("Light", "Shadows of things between the lamps and the plane show in the irradiance.",
                  "<div class=\"grid wide\">" +
-                     figure(picture(to_srgb8(in.probe, display_exposure(in.probe)), "probe"), probe_caption) +
-                     figure(picture(to_srgb8(map, 0.9 / std::max(highest, 1e-12)), "irradiance"), map_caption) +
+                     figure(picture(to_srgb8(in.probe, display_exposure(in.probe)), "probe", 2), probe_caption) +
+                     figure(picture(to_srgb8(map, 0.9 / std::max(highest, 1e-12)), "irradiance", size.x() / size.y()),
+                            map_caption) +
                      "</div>");
 }
 

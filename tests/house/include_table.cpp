@@ -123,7 +123,7 @@ const std::vector<FolderRule>& include_table() {
       {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree", "assimp"}},
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
-      {"host/report/", stage_headers + records, stage_libraries + Names{"PNG"}},
+      {"host/report/", stage_headers + records, stage_libraries},
       {"host/cli/", {"common/", "host/"}, stage_libraries + Names{"CLI11"}},
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},

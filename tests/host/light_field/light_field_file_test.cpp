@@ -24,7 +24,8 @@ LightField example() {
   LightField field;
   field.plane = {{Eigen::Quaterniond::Identity(), {0, 0, 0.25}}, {-0.3, -0.2}, {0.4, 0.5}};
   field.directions = geodesic_hemisphere(40);
-  field.proxy.radius_m = 1.5;
+  field.surroundings = sphere_surroundings({0.1F, 0.2F, 0.25F}, 2);
+  field.surroundings.panorama = ImageF(8, 2, 4, 0.75F);
   field.resolution = 5;
   field.options_json = R"({"k":6})";
   field.rgbc.resize(field.directions.size() * 25);
@@ -38,7 +39,9 @@ TEST_F(LightFieldFile, RoundTrip) {
   write_light_field(folder_ / "a.lf.exr", field);
   const LightField back = read_light_field(folder_ / "a.lf.exr");
   EXPECT_EQ(back.resolution, 5);
-  EXPECT_EQ(back.proxy.radius_m, 1.5);
+  EXPECT_EQ(back.surroundings.inverse_distance.data, field.surroundings.inverse_distance.data);
+  EXPECT_EQ(back.surroundings.centre_in_world, field.surroundings.centre_in_world);
+  EXPECT_EQ(back.surroundings.panorama.data, field.surroundings.panorama.data);
   EXPECT_EQ(back.options_json, field.options_json);
   EXPECT_EQ(back.plane.min_m, field.plane.min_m);
   EXPECT_TRUE(back.plane.world_from_plane.matrix().isApprox(field.plane.world_from_plane.matrix()));

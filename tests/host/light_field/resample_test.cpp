@@ -93,11 +93,20 @@ TEST(Resample, PhotoConsistencyFindsTheDistance) {
     const Eigen::Vector3f x = o + t * d;
     return Eigen::Vector3f::Constant(1.2F + std::sin(9 * x.x()) * std::cos(8 * x.y()));
   };
-  const auto scores = score_proxies(testing::analytic_views(200, 0.25F, 64, wall), square, 6);
-  const auto best = std::min_element(scores.begin(), scores.end(), [](const ProxyScore& a, const ProxyScore& b) {
+  const auto views = testing::analytic_views(200, 0.25F, 64, wall);
+  const auto scores = score_spheres(views, square, 6);
+  const auto best = std::min_element(scores.begin(), scores.end(), [](const SphereScore& a, const SphereScore& b) {
     return a.inconsistency < b.inconsistency;
   });
-  EXPECT_DOUBLE_EQ(best->proxy.radius_m, 1.4);
+  EXPECT_DOUBLE_EQ(best->radius_m, 1.4);
+  const Surroundings found = find_surroundings(views, square);
+  std::vector<float> distances;
+  for (const Eigen::Vector3f& d : geodesic_hemisphere(300).directions)
+    if (d.z() > 0.3F) distances.push_back(1 / found.inverse_distance_of(d));
+  std::sort(distances.begin(), distances.end());
+  EXPECT_NEAR(distances[distances.size() / 2], 1.4, 0.1);
+  EXPECT_GT(distances[distances.size() / 10], 1.1);
+  EXPECT_LT(distances[distances.size() * 9 / 10], 1.8);
 }
 
 TEST(Resample, NobodyLookedMeansNoConfidence) {
@@ -151,12 +160,24 @@ TEST(Probe, ConventionsOfConsumers) {
   EXPECT_TRUE(near(threejs(500, 250), 1, 0, 0) && near(threejs(250, 250), 0, 1, 0) && near(threejs(500, 0), 0, 0, 1));
 }
 
-TEST(Proxy, ParsesNames) {
-  EXPECT_EQ(parse_proxy("plane")->radius_m, 0);
-  EXPECT_EQ(parse_proxy("sphere:2.5")->radius_m, 2.5);
-  EXPECT_TRUE(std::isinf(parse_proxy("sphere:inf")->radius_m));
+TEST(Surroundings, ParsesNames) {
+  EXPECT_EQ(parse_sphere("sphere:2.5"), 2.5);
+  EXPECT_TRUE(std::isinf(parse_sphere("sphere:inf").value()));
   for (const char* bad : {"sphere", "sphere:", "sphere:-1", "sphere:0", "sphere:1x", "box", ""})
-    EXPECT_FALSE(parse_proxy(bad)) << bad;
+    EXPECT_FALSE(parse_sphere(bad)) << bad;
+}
+
+TEST(Surroundings, EqualAreaMapInverts) {
+  for (const Eigen::Vector3f& d : geodesic_hemisphere(200).directions)
+    EXPECT_LT((equal_area_direction(equal_area_square(d)) - d).norm(), 1e-4F);
+}
+
+TEST(Surroundings, RaysMeetTheSphere) {
+  const Surroundings sphere = sphere_surroundings({0.1F, 0, 0}, 2);
+  const Eigen::Vector3f p(0.3F, -0.2F, 0), d = Eigen::Vector3f(0.5F, 0.2F, 0.8F).normalized();
+  const Eigen::Vector3f x = p + d / sphere.inverse_distance_along(p, d);
+  EXPECT_NEAR((x - Eigen::Vector3f(0.1F, 0, 0)).norm(), 2, 1e-4);
+  EXPECT_EQ(sphere_surroundings({0, 0, 0}, std::numeric_limits<double>::infinity()).inverse_distance_along(p, d), 0);
 }
 
 }  // namespace

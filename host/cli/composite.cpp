@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/composite/composite.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/error.h"
+#include "host/cli/command.h"
+#include "host/cli/picture_options.h"
+#include "host/io/exr.h"
+
+namespace mf {
+
+namespace {
+
+struct Arguments : PictureArguments {
+  std::filesystem::path plate;
+};
+
+ImageF read_plate(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  if (path.extension() != ".exr")
+    throw InputError(file, "--plate", "must be a linear EXR picture: radiance cannot be had from another format");
+  ImageF plate = read_exr(path);
+  if (plate.channels == 3) return plate;
+  ImageF colour(plate.width, plate.height, 3);
+  for (std::size_t i = 0; i < colour.data.size(); ++i) colour.data[i] = plate.data[i / 3];
+  return colour;
+}
+
+void run(Arguments& a) {
+  const auto start = std::chrono::steady_clock::now();
+  check_picture_arguments("composite", a);
+  const ImageF plate = read_plate(a.plate);
+  const View view = read_view(a.cameras, a.view, std::array<int, 2>{plate.width, plate.height});
+  const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
+  const LightField field = read_light_field(a.field);
+  const CompositeResult r = composite(field, mesh, plate, view, {a.options}, progress_bar());
+  write_picture(a.output, r.picture, a.exposure);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  nlohmann::json summary = rendering_summary(r.layers, seconds);
+  summary["changed"] = r.changed;
+  print_summary(
+      a.json, summary,
+      fmt::format("{} triangles into {} × {}, {} directions on {}, {:.1f} % of the picture changed, {:.1f} s\n"
+                  "{}\n",
+                  mesh.triangles.size(), plate.width, plate.height, r.layers.lights, r.layers.backend, 100 * r.changed,
+                  seconds, a.output.string()));
+}
+
+}  // namespace
+
+void add_composite_command(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("composite", "an object and its shadow in a picture of the real place");
+  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  add_picture_options(*command, *a);
+  command->add_option("--plate", a->plate, "the picture that the object goes into: linear EXR")->required();
+  command->callback([a] { run(*a); });
+}
+
+}  // namespace mf

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/render/render.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "common/error.h"
+#include "host/cli/command.h"
+#include "host/cli/picture_options.h"
+
+namespace mf {
+
+namespace {
+
+struct Arguments : PictureArguments {
+  std::optional<double> ground_albedo;
+  std::vector<int> size_px;
+};
+
+// The object over a diffuse ground.
+void add_ground(ImageF& picture, const RenderResult& r, double albedo) {
+  const auto scale = static_cast<float>(albedo / std::numbers::pi);
+  for (std::size_t i = 0; i < picture.data.size() / 4; ++i) {
+    const float uncovered = 1 - picture.data[4 * i + 3];
+    bool ground = false;
+    for (std::size_t c = 0; c < 3; ++c) {
+      picture.data[4 * i + c] += uncovered * scale * r.ground_with.data[3 * i + c];
+      ground = ground || r.ground_without.data[3 * i + c] > 0;
+    }
+    if (ground) picture.data[4 * i + 3] = 1;
+  }
+}
+
+void run(Arguments& a) {
+  const auto start = std::chrono::steady_clock::now();
+  check_picture_arguments("render", a);
+  if (a.ground_albedo && !(*a.ground_albedo >= 0 && *a.ground_albedo <= 1))
+    throw InputError("render", "--ground-albedo", "must lie between 0 and 1");
+  std::optional<std::array<int, 2>> size;
+  if (!a.size_px.empty()) {
+    size = std::array<int, 2>{a.size_px[0], a.size_px[1]};
+    if ((*size)[0] < 1 || (*size)[1] < 1 || (*size)[0] > 32768 || (*size)[1] > 32768)
+      throw InputError("render", "--size", "must be a width and a height from 1 to 32768 pixels");
+  }
+  const View view = read_view(a.cameras, a.view, size);
+  const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
+  const LightField field = read_light_field(a.field);
+  RenderInput input{field, mesh, view, std::nullopt};
+  if (a.ground_albedo) input.ground = diffuse_ground(field, mesh, *a.ground_albedo);
+  const RenderResult r = render(input, a.options, progress_bar());
+  ImageF picture = r.object;
+  if (a.ground_albedo) add_ground(picture, r, *a.ground_albedo);
+  write_picture(a.output, picture, a.exposure);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  print_summary(
+      a.json, rendering_summary(r, seconds),
+      fmt::format("{} × {}, {} triangles, {} directions on {}, {:.1f} s\n{}\n", view.camera.width, view.camera.height,
+                  mesh.triangles.size(), r.lights, r.backend, seconds, a.output.string()));
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& program) {
+  CLI::App* command = program.add_subcommand("render", "an object in the captured light");
+  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  add_picture_options(*command, *a);
+  command->add_option("--ground-albedo", a->ground_albedo,
+                      "show the light field's plane too, as a diffuse ground of this albedo");
+  command
+      ->add_option("--size", a->size_px,
+                   "width and height in pixels (default: the file's, or twice the principal point)")
+      ->expected(2);
+  command->callback([a] { run(*a); });
+}
+
+}  // namespace mf

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "host/render/irradiance.h"
+
+namespace mf {
+
+// How visibility is found. automatic: gl on a graphics card; cpu where OpenGL is missing or itself runs on the CPU.
+enum class Backend { automatic, gl, cpu };
+[[nodiscard]] std::optional<Backend> parse_backend(std::string_view name);  // "auto", "gl", "cpu"
+
+// One mesh, lit by whichever back end was chosen. `mesh` and `scene` are the same surface and outlive it.
+class Illuminator {
+ public:
+  // Throws InputError when gl is asked for and OpenGL 4.3 is not to be had.
+  Illuminator(Backend, const TriangleMesh&, const RayScene&);
+  Illuminator(Illuminator&&) noexcept;
+  ~Illuminator();
+
+  // See irradiance_cpu: both back ends compute the same sum.
+  [[nodiscard]] std::vector<Eigen::Vector3f> irradiance(std::span<const SurfacePoint>, const LightSet&, LightSum,
+                                                        const Progress& = {});
+
+  // "cpu", or "gl" with the renderer's name.
+  [[nodiscard]] const std::string& description() const { return description_; }
+
+ private:
+  struct Gl;
+  const RayScene* scene_;
+  std::unique_ptr<Gl> gl_;  // empty: cpu
+  std::string description_;
+};
+
+}  // namespace mf
