@@ -149,8 +149,8 @@ std::optional<Eigen::Vector3f> propose(const Spot& a, const Spot& b, const Emitt
 float typical_radius(const std::vector<const Spot*>& rays, const Eigen::Vector3f& x) {
   std::vector<float> radii;
   for (const Spot* ray : rays) radii.push_back(ray->radius_rad * (x - ray->origin).norm());
-  // Occluders only make spots smaller: a value above the median is nearer to the lamp.
-  const auto upper = radii.begin() + static_cast<std::ptrdiff_t>(3 * radii.size() / 5);
+  // The median: occluders make some spots smaller, blur makes others larger.
+  const auto upper = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
   std::nth_element(radii.begin(), upper, radii.end());
   return *upper;
 }
