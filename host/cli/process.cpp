@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/atomic_file.h"
+#include "common/error.h"
+#include "common/json_file.h"
+#include "common/session.h"
+#include "host/calibration/calibrate.h"
+#include "host/calibration/session_targets.h"
+#include "host/cli/command.h"
+#include "host/cli/run_resample.h"
+#include "host/io/exr.h"
+#include "host/io/image_file.h"
+#include "host/light_field/probe.h"
+#include "host/photometry/photometry.h"
+#include "host/report/field_pictures.h"
+#include "host/report/report.h"
+
+namespace mf {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double probe_height_m = 0.1;  // above the plane's middle: where a small object's own middle would be
+constexpr int probe_width_px = 1024;
+
+struct Arguments {
+  fs::path session;
+  fs::path output;
+  PhotometryOptions photometry;
+  CalibrationOptions calibration;
+  ResampleOptions resample;
+  bool json = false;
+};
+
+// Runs a stage and notes how long it took.
+template <typename Stage>
+auto timed(std::map<std::string, double>& seconds, const std::string& name, const Stage& stage) {
+  const auto start = std::chrono::steady_clock::now();
+  auto result = stage();
+  seconds[name] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return result;
+}
+
+ResponseCurve estimate_response(const SessionReader& session, const PhotometryOptions& options,
+                                const Progress& progress) {
+  const PhotometryResult result = photometry(session, options, progress);
+  write_json_file(session.folder() / "response.json", response_json(result, options));
+  return result.curve;
+}
+
+Calibration estimate_calibration(const SessionReader& session, const ResponseCurve& response,
+                                 const CalibrationOptions& options, const Progress& progress) {
+  const CalibrationInput input = find_session_targets(session, response, {}, options.threads, progress);
+  CalibrationResult result = calibrate(input, options, progress);
+  write_calibration(session.folder() / "calibration.json", result.calibration);
+  return std::move(result.calibration);
+}
+
+// The point over the middle of the plane's rectangle where the report takes its probe.
+Eigen::Vector3d probe_point(const PlaneRectangle& plane) {
+  const Eigen::Vector2d middle = 0.5 * (plane.min_m + plane.max_m);
+  return plane.world_from_plane * Eigen::Vector3d(middle.x(), middle.y(), probe_height_m);
+}
+
+void write_probe(const fs::path& folder, const Probe& probe, const Eigen::Vector3d& at) {
+  ExrOptions options;
+  options.latlong = true;
+  options.attributes = {{"mfConsumer", "openexr"}, {"mfAt", fmt::format("{} {} {}", at.x(), at.y(), at.z())}};
+  write_exr(folder / "probe.exr", probe.radiance, options);
+  write_png(folder / "probe.png", to_srgb8(probe.radiance, display_exposure(probe.radiance)));
+}
+
+std::size_t used_frames(const Calibration& calibration) {
+  return static_cast<std::size_t>(std::count_if(calibration.frames.begin(), calibration.frames.end(),
+                                                [](const MirrorPose& pose) { return pose.used; }));
+}
+
+void check_options(const Arguments& a) {
+  for (const auto& problem : {a.photometry.validate(), a.calibration.validate(), a.resample.validate()})
+    if (problem) throw InputError("process", "options", *problem);
+  std::error_code error;
+  fs::create_directories(a.output, error);
+  if (error) throw InputError(a.output.string(), "", "cannot be created: " + error.message());
+}
+
+void run(const Arguments& a) {
+  const SessionReader session(a.session);
+  check_options(a);
+  const Progress progress = progress_bar();
+  std::map<std::string, double> seconds;
+  const ResponseCurve response =
+      timed(seconds, "photometry", [&] { return estimate_response(session, a.photometry, progress); });
+  const Calibration calibration =
+      timed(seconds, "calibrate", [&] { return estimate_calibration(session, response, a.calibration, progress); });
+  const ResampleResult resampled = timed(
+      seconds, "resample", [&] { return run_resample(a.session, a.output / "field.lf.exr", a.resample, progress); });
+  const Eigen::Vector3d at = probe_point(resampled.field.plane);
+  const Probe probe = timed(
+      seconds, "probe", [&] { return make_probe(resampled.field, at, LatLongConvention::openexr, probe_width_px); });
+  write_probe(a.output, probe, at);
+  const std::string name = fs::absolute(a.session).lexically_normal().filename().string();
+  write_file_atomically(a.output / "report.html",
+                        report_html({"Mirrorfield report: " + name, session, response, calibration, resampled.field,
+                                     probe.radiance, at, seconds},
+                                    progress));
+  const std::size_t used = used_frames(calibration);
+  const double covered = covered_share(resampled.field);
+  print_summary(a.json,
+                {{"frames", calibration.frames.size()},
+                 {"used", used},
+                 {"rms_px", calibration.rms_px},
+                 {"directions", resampled.field.directions.size()},
+                 {"size", resampled.field.resolution},
+                 {"covered_share", covered},
+                 {"absolute", response.absolute},
+                 {"seconds", seconds},
+                 {"output", a.output.string()}},
+                fmt::format("{} of {} frames posed, {:.3f} px; {:.0f} % of the directions seen\n"
+                            "{}: field.lf.exr, probe.exr, probe.png, report.html\n",
+                            used, calibration.frames.size(), calibration.rms_px, 100 * covered, a.output.string()));
+}
+
+}  // namespace
+
+void add_process_command(CLI::App& program) {
+  CLI::App* command = program.add_subcommand(
+      "process", "photometry, calibration, light field and probe of a session in one go, and a report (report.html)");
+  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  command->add_option("session", a->session, "session folder; response.json and calibration.json are written there")
+      ->required();
+  command->add_option("-o,--output", a->output, "folder for the results")->required();
+  command->add_flag("--linear", a->photometry.linear,
+                    "use no exposure sweep: the sensor is linear from the black level to its last code");
+  command
+      ->add_option("--height", a->resample.height_m, "height of the light-field plane above the world's ground, metres")
+      ->capture_default_str();
+  command->add_option("--directions", a->resample.directions, "about how many directions over the hemisphere")
+      ->capture_default_str();
+  command->add_option("--size", a->resample.size, "texels along each side of the plane's rectangle")
+      ->capture_default_str();
+  command->add_option("--proxy", a->resample.proxy, "what the views are focused on, as for `resample`")
+      ->capture_default_str();
+  add_json_flag(*command, a->json);
+  command->callback([a] { run(*a); });
+}
+
+}  // namespace mf
