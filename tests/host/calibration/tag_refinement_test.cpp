@@ -119,14 +119,18 @@ TEST(RefineTag, DoesNotConfirmAnotherTagOrPlainNoise) {
   const ImageF picture = photograph(tag_pattern("tag36h11", 8), scene, 64, 1);
   const std::optional<RefinedTag> other =
       refine_tag(picture, PixelLayout::bayer_rg, tag_pattern("tag36h11", 9), scene.corners);
-  if (other) EXPECT_LT(other->right_cells, 0.9);
+  if (other) {
+    EXPECT_LT(other->right_cells, 0.9);
+  }
   std::mt19937 random(1);
   std::uniform_real_distribution<float> uniform(0, 1);
   ImageF noise(64, 64, 1);
   for (float& v : noise.data) v = uniform(random);
   const std::optional<RefinedTag> ghost =
       refine_tag(noise, PixelLayout::mono, tag_pattern("tag36h11", 9), scene.corners);
-  if (ghost) EXPECT_LT(ghost->right_cells, 0.9);
+  if (ghost) {
+    EXPECT_LT(ghost->right_cells, 0.9);
+  }
   EXPECT_FALSE(refine_tag(ImageF(64, 64, 1), PixelLayout::mono, tag_pattern("tag36h11", 9), scene.corners));
 }
 
