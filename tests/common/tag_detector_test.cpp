@@ -103,7 +103,7 @@ double corner_rms(const std::array<Eigen::Vector2d, 4>& a, const std::array<Eige
   return best;
 }
 
-TEST(TagDetector, FindsTheTagsOfRealPhotos) {
+TEST(TagDetector, DISABLED_FindsTheTagsOfRealPhotos) {
   const std::filesystem::path folder = std::filesystem::path(MF_SHARED_DATA) / "apriltag";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
   const std::filesystem::path work =
