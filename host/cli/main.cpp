@@ -26,6 +26,7 @@ int run(int argc, char** argv) {
   mf::add_probe_command(program);
   mf::add_render_command(program);
   mf::add_composite_command(program);
+  mf::add_process_command(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
