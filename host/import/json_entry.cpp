@@ -34,7 +34,8 @@ void JsonEntry::fail(const char* key, const std::string& problem_and_remedy) con
 void JsonEntry::require_known_keys(std::initializer_list<const char*> known) const {
   std::string list;
   for (const char* key : known) list += (list.empty() ? "" : ", ") + std::string(key);
-  for (const auto& [key, unused] : object_->items()) {
+  for (const auto& item : object_->items()) {
+    const std::string& key = item.key();
     const bool note = key == "meaning" || key == "comment";
     if (note || std::any_of(known.begin(), known.end(), [&](std::string_view k) { return k == key; })) continue;
     fail(key.c_str(), fmt::format("is no key of this file: remove it, or use one of {}", list));

@@ -94,8 +94,10 @@ void require_no_nan(const ImageF& image, const std::string& file) {
 }  // namespace
 
 ImageF read_exr(const std::filesystem::path& path) {
-  const std::string file = path.string();
-  const std::string bytes = read_file_bytes(path);
+  return decode_exr(read_file_bytes(path), path.string());
+}
+
+ImageF decode_exr(std::string_view bytes, const std::string& file) {
   ImageF image;
   try {
     MemoryStream stream(bytes, file);

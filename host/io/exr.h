@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "common/image.h"
 
@@ -13,6 +14,8 @@ namespace mf {
 // Throws InputError naming the file when it is missing, damaged, or holds neither; NaN pixels are an error that names
 // the first one.
 [[nodiscard]] ImageF read_exr(const std::filesystem::path&);
+// The same from memory; `file` only names it in errors.
+[[nodiscard]] ImageF decode_exr(std::string_view bytes, const std::string& file);
 
 struct ExrOptions {
   bool half = true;                                 // 16-bit float channels; else 32-bit

@@ -40,7 +40,7 @@ StoredImage read_stored_image(const std::filesystem::path& path) {
   const std::string bytes = read_file_bytes(path);
   if (is_png(bytes)) return decode_png(bytes, path.string());
   if (is_tiff(bytes)) return decode_tiff(bytes, path.string());
-  if (is_exr(bytes)) return {read_exr(path), 32};
+  if (is_exr(bytes)) return {decode_exr(bytes, path.string()), 32};
   throw InputError(path.string(), "",
                    bytes.empty() ? "is empty: copy or record it again" : "is no PNG, TIFF or EXR: convert it to one");
 }

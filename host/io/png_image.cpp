@@ -110,8 +110,9 @@ bool read_png_rows(const PngReader& reader, png_bytep* rows) {
 template <typename Sample>
 bool read_pixels(const PngReader& reader, ImageU16& image) {
   Image<Sample> stored(image.width, image.height, image.channels);
-  std::vector<png_bytep> rows;
-  for (int y = 0; y < image.height; ++y) rows.push_back(reinterpret_cast<png_bytep>(stored.row(y).data()));
+  std::vector<png_bytep> rows(static_cast<std::size_t>(image.height));
+  for (int y = 0; y < image.height; ++y)
+    rows[static_cast<std::size_t>(y)] = reinterpret_cast<png_bytep>(stored.row(y).data());
   if (!read_png_rows(reader, rows.data())) return false;
   image.data.assign(stored.data.begin(), stored.data.end());
   return true;
@@ -167,9 +168,9 @@ std::string encode_png(const ImageU8& image) {
   check(!image.empty() && (image.channels == 1 || image.channels == 3), "a PNG of ours has 1 or 3 channels");
   const PngWriter writer;
   std::string bytes;
-  std::vector<png_bytep> rows;
+  std::vector<png_bytep> rows(static_cast<std::size_t>(image.height));
   // libpng's row pointers are not const; it only reads them.
-  for (int y = 0; y < image.height; ++y) rows.push_back(const_cast<png_bytep>(image.row(y).data()));
+  for (int y = 0; y < image.height; ++y) rows[static_cast<std::size_t>(y)] = const_cast<png_bytep>(image.row(y).data());
   check(write_png_rows(writer, bytes, image, rows.data()), "a PNG is written to memory");
   return bytes;
 }

@@ -52,6 +52,7 @@ CommandOutcome run_command(const std::vector<std::string>& arguments) {
   const std::string out = folder / "out";
   const std::string err = folder / "err";
   std::vector<char*> raw;
+  raw.reserve(arguments.size() + 1);
   for (const std::string& argument : arguments) raw.push_back(const_cast<char*>(argument.c_str()));  // execvp's type
   raw.push_back(nullptr);
   const pid_t child = ::fork();
