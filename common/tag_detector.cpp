@@ -65,10 +65,15 @@ class Stretch {
   float shoulder_ = 0;
 };
 
-ImageU8 to_8_bits(const ImageF& linear) {
-  const Stretch stretch(linear);
-  ImageU8 picture(linear.width, linear.height, 1);
-  std::transform(linear.data.begin(), linear.data.end(), picture.data.begin(), stretch);
+ImageU8 to_8_bits(const ImageF& values) {
+  const Stretch stretch(values);
+  ImageU8 picture(values.width, values.height, 1);
+  std::transform(values.data.begin(), values.data.end(), picture.data.begin(), stretch);
+  return picture;
+}
+
+ImageF square_roots(ImageF picture) {
+  for (float& v : picture.data) v = std::sqrt(std::max(v, 0.F));
   return picture;
 }
 
@@ -76,7 +81,9 @@ ImageU8 to_8_bits(const ImageF& linear) {
 
 struct TagDetector::Impl {
   explicit Impl(const TagDetectorOptions& options)
-      : family(make_tag_family(options.family)), detector(apriltag_detector_create()) {
+      : family(make_tag_family(options.family)),
+        detector(apriltag_detector_create()),
+        square_root_levels(options.square_root_levels) {
     detector->nthreads = 1;  // more of them race (apriltag #387)
     detector->quad_decimate = static_cast<float>(options.quad_decimate);
     detector->quad_sigma = static_cast<float>(options.quad_sigma);
@@ -86,6 +93,7 @@ struct TagDetector::Impl {
 
   TagFamily family;  // outlives the detector, which points into it
   std::unique_ptr<apriltag_detector_t, DetectorDeleter> detector;
+  bool square_root_levels;
 };
 
 TagDetector::TagDetector(const TagDetectorOptions& options) {
@@ -99,7 +107,7 @@ TagDetector::~TagDetector() = default;
 std::vector<TagDetection> TagDetector::detect(const ImageF& linear) {
   check(linear.channels == 1, "tags are sought in a picture of one channel");
   if (linear.empty()) return {};
-  ImageU8 picture = to_8_bits(linear);
+  ImageU8 picture = to_8_bits(impl_->square_root_levels ? square_roots(linear) : linear);
   image_u8_t view{picture.width, picture.height, picture.width, picture.data.data()};
   const std::unique_ptr<zarray_t, DetectionsDeleter> found(apriltag_detector_detect(impl_->detector.get(), &view));
   std::vector<TagDetection> tags;

@@ -25,6 +25,9 @@ struct TagDetectorOptions {
   std::string family = "tag36h11";
   double quad_decimate = 1;  // quads are searched in a picture this many times smaller, ≥ 1; faster, misses small tags
   double quad_sigma = 0;     // Gaussian blur in pixels before the search, ≥ 0; for noisy pictures
+  // The eight bits hold square roots, which spend more of them on shadows: finds more tags, but shifts edges towards
+  // the dark by up to half a pixel. For who aligns the corners again on the linear picture.
+  bool square_root_levels = false;
   int max_corrected_bits = 1;  // 0 to 3: more finds more tags and more ghosts
 };
 
@@ -37,7 +40,8 @@ class TagDetector {
   TagDetector& operator=(TagDetector&&) noexcept;
   ~TagDetector();
 
-  // `linear`: one channel, proportional to radiance, any scale: it is stretched to 8 bits between robust extremes.
+  // `linear`: one channel, proportional to radiance, any scale: it is stretched to 8 bits, with a
+  // shoulder for what is brighter than most of the picture.
   [[nodiscard]] std::vector<TagDetection> detect(const ImageF& linear);
 
  private:

@@ -40,11 +40,15 @@ struct Noise {
   [[nodiscard]] double variance(double t) const { return dark + (bright - dark) * std::clamp(t, 0.0, 1.0); }
 };
 
+struct NoiseSums {
+  double dark = 0, bright = 0, dark_weight = 0, bright_weight = 0;
+};
+
 struct State {
   Eigen::Matrix3d picture_from_tag;  // tag: ± 1 at the border's corners, y up; picture: pixels from `centre`
   double blur_px = 0;
   Light light;
-  Noise noise;
+  std::array<Noise, 3> noise;  // by colour: each has its own gain
 };
 
 struct Sample {         // one pixel of the tag under the current state
@@ -99,7 +103,7 @@ class Alignment {
   [[nodiscard]] int for_each_sample(Visit&& visit) const;
   [[nodiscard]] bool fit_light();
   [[nodiscard]] FullMatrix accumulate(FullVector& gradient);
-  void update_noise(const std::array<double, 2>& sums, const std::array<double, 2>& weights);
+  void update_noise(const std::array<NoiseSums, 3>& sums);
 
   const ImageF& picture_;
   PixelLayout layout_;
@@ -174,8 +178,7 @@ FullMatrix Alignment::accumulate(FullVector& gradient) {
   std::array<PixelVector, 3> right;
   normal.fill(PixelMatrix::Zero());
   right.fill(PixelVector::Zero());
-  std::array<double, 2> noise_sums{};
-  std::array<double, 2> noise_weights{};
+  std::array<NoiseSums, 3> noise{};
   const Light& light = state_.light;
   const Eigen::RowVector3d last_row = state_.picture_from_tag.row(2);
   (void)for_each_sample([&](const Sample& s) {
@@ -183,10 +186,11 @@ FullMatrix Alignment::accumulate(FullVector& gradient) {
     const double slope = 1 + light.gradient.dot(s.tag);
     const double t = s.model.value;
     const double residual = (s.value - light.offset[c]) / light.gain[c] - t * slope;
-    const double normalized2 = residual * residual / state_.noise.variance(t);
+    const double variance = state_.noise[c].variance(t);
+    const double normalized2 = residual * residual / variance;
     constexpr double cauchy2 = 9;  // three standard deviations: Gaussian noise loses little
     const double robust = 1 / (1 + normalized2 / cauchy2);
-    const double weight = robust / state_.noise.variance(t);
+    const double weight = robust / variance;
     // A point of the tag that moves by dx changes the model at this pixel by −∇T · dx.
     const double w = last_row.dot(s.tag.homogeneous());
     const Eigen::RowVector2d pull = -slope / w * s.model_gradient;
@@ -203,12 +207,12 @@ FullMatrix Alignment::accumulate(FullVector& gradient) {
       right[c].tail<4>() += weight * residual * of_light;
     }
     const double bright = std::clamp(t, 0.0, 1.0);
-    noise_sums[0] += robust * (1 - bright) * residual * residual;
-    noise_sums[1] += robust * bright * residual * residual;
-    noise_weights[0] += robust * (1 - bright);
-    noise_weights[1] += robust * bright;
+    noise[c].dark += robust * (1 - bright) * residual * residual;
+    noise[c].bright += robust * bright * residual * residual;
+    noise[c].dark_weight += robust * (1 - bright);
+    noise[c].bright_weight += robust * bright;
   });
-  update_noise(noise_sums, noise_weights);
+  update_noise(noise);
   FullMatrix full = FullMatrix::Zero();
   gradient.setZero();
   for (int c = 0; c < 3; ++c) {
@@ -229,12 +233,15 @@ FullMatrix Alignment::accumulate(FullVector& gradient) {
   return full;
 }
 
-// Gaussian noise seen through the Cauchy weight looks smaller: E[w r²]/E[w] = 0.74 σ² at a scale of three sigma.
-void Alignment::update_noise(const std::array<double, 2>& sums, const std::array<double, 2>& weights) {
-  constexpr double seen_fraction = 0.80;
+// Gaussian noise seen through a Cauchy weight of three sigma looks smaller: E[w r²]/E[w] = 0.849 σ².
+void Alignment::update_noise(const std::array<NoiseSums, 3>& sums) {
+  constexpr double seen_fraction = 0.849;
   constexpr double smallest = 1e-6;  // of the contrast squared: 8-bit quantization alone is 1e-6
-  state_.noise.dark = std::max(sums[0] / std::max(weights[0], 1.0) / seen_fraction, smallest);
-  state_.noise.bright = std::max(sums[1] / std::max(weights[1], 1.0) / seen_fraction, smallest);
+  for (std::size_t c = 0; c < sums.size(); ++c) {
+    const NoiseSums& s = sums[c];
+    state_.noise[c].dark = std::max(s.dark / std::max(s.dark_weight, 1.0) / seen_fraction, smallest);
+    state_.noise[c].bright = std::max(s.bright / std::max(s.bright_weight, 1.0) / seen_fraction, smallest);
+  }
 }
 
 std::optional<double> Alignment::step(bool free_blur) {
@@ -331,7 +338,7 @@ std::optional<RefinedTag> refine_tag(const ImageF& picture, PixelLayout layout, 
   check(picture.channels == 1 && layout != PixelLayout::rgb, "tags are aligned in a mosaic or a mono picture");
   Alignment alignment(picture, layout, pattern, start);
   if (!alignment.begin(start, options.initial_blur_px)) return std::nullopt;
-  constexpr double converged_px = 0.01;  // a tenth of what the noise leaves open
+  constexpr double converged_px = 0.02;  // a fifth of what the noise leaves open
   constexpr int held_blur_steps = 2;     // until the edges overlap, blur would only grow to bridge the gap
   bool converged = false;
   for (int i = 0; i < options.max_iterations && !converged; ++i) {

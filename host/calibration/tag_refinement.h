@@ -24,7 +24,7 @@ struct RefinedTag {
 };
 
 struct TagRefinementOptions {
-  int max_iterations = 12;
+  int max_iterations = 30;
   double initial_blur_px = 0.7;
   double max_shift_cells = 1;  // a corner that moves further, in cells of the tag, has left its tag
 };

@@ -188,10 +188,11 @@ ImageF luminance(const ImageF& picture) {
 
 namespace {
 
-TagDetectorOptions detector_options(const std::string& family, double quad_decimate) {
+TagDetectorOptions detector_options(const std::string& family, double quad_decimate, bool aligned_later) {
   TagDetectorOptions options;
   options.family = family;
   options.quad_decimate = quad_decimate;
+  options.square_root_levels = aligned_later;
   return options;
 }
 
@@ -200,8 +201,8 @@ TagDetectorOptions detector_options(const std::string& family, double quad_decim
 TagSearch::TagSearch(SearchedTarget target, const TagSearchOptions& options)
     : target_(std::move(target)),
       options_(options),
-      detector_(detector_options(target_.family, options.quad_decimate)),
-      hard_detector_(detector_options(target_.family, 1)) {
+      detector_(detector_options(target_.family, options.quad_decimate, options.refine)),
+      hard_detector_(detector_options(target_.family, 1, options.refine)) {
   for (const auto& [id, corners] : target_.corners_in_target) patterns_.emplace(id, tag_pattern(target_.family, id));
 }
 
@@ -214,17 +215,13 @@ std::optional<TagSighting> TagSearch::align(const ImageF& picture, PixelLayout l
   return TagSighting{id, target_.corners_in_target.at(id), refined->corners_px, refined->information, true};
 }
 
-// What AprilTag finds, aligned. `hard`: at twice the size (grazing tags are a few pixels high) and as square roots,
-// which spend more of the eight bits on shadows; corners then are biased by up to half a pixel, and aligned again.
+// What AprilTag finds, aligned. `hard`: at twice the size, for grazing tags are a few pixels high.
 std::vector<TagSighting> TagSearch::detect(TagDetector& detector, const ImageF& picture, PixelLayout layout,
                                            bool hard) const {
   const ImageF smooth = smooth_mosaic(picture);
   const PixelBox lit = lit_box(smooth);
   ImageF seen = cropped(smooth, lit);
-  if (hard) {
-    seen = twice_the_size(seen);
-    for (float& v : seen.data) v = std::sqrt(std::max(v, 0.F));
-  }
+  if (hard) seen = twice_the_size(seen);
   const double scale = hard ? 0.5 : 1;
   std::vector<TagSighting> found;
   for (const TagDetection& tag : detector.detect(seen)) {

@@ -22,11 +22,11 @@ struct SearchedTarget {
 [[nodiscard]] SearchedTarget searched_target(const WorldTarget&);
 
 struct TagSearchOptions {
-  double quad_decimate = 2;   // see TagDetectorOptions; tags that it misses are looked for where they must be
-  int few_tags = 4;           // with fewer than this, AprilTag looks again, at twice the size and in brighter shadows
-  bool refine = true;         // align each tag's pattern with the picture; off: AprilTag's corners, for comparison
-  bool complete = true;       // look for the target's other tags where those found say they are
-  double raw_sigma_px = 0.3;  // what AprilTag's own corners are taken for, when refine is off
+  double quad_decimate = 2;      // see TagDetectorOptions; tags that it misses are looked for where they must be
+  int few_tags = 4;              // with fewer than this, AprilTag looks again, at twice the size
+  bool refine = true;            // align each tag's pattern with the picture; off: AprilTag's corners, for comparison
+  bool complete = true;          // look for the target's other tags where those found say they are
+  double raw_sigma_px = 0.3;     // what AprilTag's own corners are taken for, when refine is off
   double min_right_cells = 0.9;  // a tag counts when the picture confirms so many of its cells, 0 to 1
 };
 
@@ -47,7 +47,7 @@ class TagSearch {
   SearchedTarget target_;
   TagSearchOptions options_;
   TagDetector detector_;
-  TagDetector hard_detector_;  // for small, grazing or dark tags
+  TagDetector hard_detector_;  // for small and grazing tags
   std::map<int, TagPattern> patterns_;
 };
 

@@ -39,10 +39,11 @@ TEST(FlippedCamera, SeesTheMirrorImageOfEveryPicture) {
 }
 
 // What a COLMAP reader makes of a written model: a world point in a flipped picture must lie where the mirror shows it.
-TEST(ExportColmap, DISABLED_PutsWorldPointsWhereTheMirrorShowsThem) {
+TEST(ExportColmap, PutsWorldPointsWhereTheMirrorShowsThem) {
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("mf_colmap_" + std::to_string(::getpid()));
   std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
   Calibration calibration;
   calibration.camera = distorted_camera();
   calibration.cam_from_world = facing_pose(1.3, 0.9, 0.1, {0.02, 0.05});
@@ -58,9 +59,17 @@ TEST(ExportColmap, DISABLED_PutsWorldPointsWhereTheMirrorShowsThem) {
   ImageU16 pixels(header.width, header.height, 1, 100);
   pixels.at(700, 20) = 200;
   SessionWriter writer(folder / "S", header, {false});
-  writer.append(Frame{{"00007.png", FrameRole::mirror, 0.01, 0, 0}, pixels});
-  writer.append(Frame{{"00008.png", FrameRole::mirror, 0.01, 0, 0}, pixels});
-  writer.append(Frame{{"scene.png", FrameRole::scene, 0.01, 0, 0}, pixels});
+  const auto append = [&](const char* name, FrameRole role) {
+    Frame frame;
+    frame.info.name = name;
+    frame.info.role = role;
+    frame.info.exposure_s = 0.01;
+    frame.pixels = pixels;
+    writer.append(frame);
+  };
+  append("00007.png", FrameRole::mirror);
+  append("00008.png", FrameRole::mirror);
+  append("scene.png", FrameRole::scene);
   writer.finish();
   const ColmapSummary summary =
       export_colmap(folder / "colmap", calibration, SessionReader(folder / "S"), linear_response(8, 0, 1, 1), {});

