@@ -1,0 +1,10 @@
+# cmake -DOUTPUT=shaders.cpp -DSHADERS=a.vert;b.frag -P embed_shaders.cmake: the texts as one C++ file.
+set(code "// Generated from shaders/ by cmake/embed_shaders.cmake\n#include \"host/gl/shader_source.h\"\n\nnamespace mf {\n\n")
+string(APPEND code "std::string_view embedded_shader(std::string_view name) {\n")
+foreach(shader IN LISTS SHADERS)
+  get_filename_component(name ${shader} NAME)
+  file(READ ${shader} text)
+  string(APPEND code "  if (name == \"${name}\")\n    return R\"glsl(${text})glsl\";\n")
+endforeach()
+string(APPEND code "  return {};\n}\n\n}  // namespace mf\n")
+file(WRITE ${OUTPUT} "${code}")
