@@ -46,21 +46,19 @@ class Stretch {
       if (v > 0 && std::isfinite(v)) lit.push_back(v);
     if (lit.size() < 16) return;
     constexpr double bright_surface = 0.9;
-    black_ = percentile(lit, 0.001);
-    knee_ = std::max(percentile(lit, bright_surface) - black_, 0.F);
-    const float top = *std::max_element(lit.begin(), lit.end()) - black_;
-    if (knee_ > 0) shoulder_ = (255 - knee_level) / std::log(std::max(top / knee_, 1.5F));
+    knee_ = percentile(lit, bright_surface);
+    const float top = *std::max_element(lit.begin(), lit.end());
+    shoulder_ = (255 - knee_level) / std::log(std::max(top / knee_, 1.5F));
   }
   std::uint8_t operator()(float v) const {
-    if (!(v > black_) || !(knee_ > 0)) return 0;
-    const float x = (v - black_) / knee_;
+    if (!(v > 0) || !(knee_ > 0)) return 0;
+    const float x = v / knee_;
     const float level = x <= 1 ? knee_level * x : knee_level + shoulder_ * std::log(x);
     return static_cast<std::uint8_t>(std::min(level, 255.F) + 0.5F);
   }
 
  private:
   static constexpr float knee_level = 200;
-  float black_ = 0;
   float knee_ = 0;
   float shoulder_ = 0;
 };

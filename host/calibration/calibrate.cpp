@@ -24,6 +24,7 @@ namespace {
 
 constexpr double degrees = std::numbers::pi / 180;
 constexpr double chi2_8_median = 7.344;  // χ² with the eight degrees of a tag
+constexpr double chi2_8_fifth = 11.03;   // exceeded by a fifth
 constexpr double chi2_8_outlier = 50;    // exceeded once in 2·10⁷
 constexpr int fewest_tags_to_calibrate = 2;
 
@@ -211,7 +212,7 @@ void Calibrator::adjust() {
     works_[chosen[k]].pose->cam_from_target = adjustment_.poses[k].cam_from_target;
 }
 
-// Scales the information so that the median tag has the χ² it should have, then marks those far above it.
+// Scales the information so that χ² is distributed as it should be, then marks the tags far out.
 void Calibrator::judge_tags() {
   std::vector<double> all;
   for (const Work& work : works_)
@@ -219,9 +220,11 @@ void Calibrator::judge_tags() {
       for (const TagSighting& tag : work.view.tags)
         all.push_back(tag_chi2(adjustment_.camera, work.pose->cam_from_target, tag));
   if (all.empty()) return;
-  std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+  std::sort(all.begin(), all.end());
+  // The upper fifth too: real corners have heavier tails than the median tells, and those far out in a distorted
+  // picture, which say most about the lens, are the first to look like outliers.
   constexpr double least = 1e-6;  // perfect, made-up corners: no noise to scale by
-  const double factor = std::max(all[all.size() / 2] / chi2_8_median, least);
+  const double factor = std::max({all[all.size() / 2] / chi2_8_median, all[all.size() * 4 / 5] / chi2_8_fifth, least});
   variance_factor_ *= factor;
   for (Work& work : works_)
     for (TagSighting& tag : work.view.tags) {

@@ -84,14 +84,18 @@ std::size_t used_frames(const Calibration& calibration) {
 void check_options(const Arguments& a) {
   for (const auto& problem : {a.photometry.validate(), a.calibration.validate(), a.resample.validate()})
     if (problem) throw InputError("process", "options", *problem);
+}
+
+void create_output_folder(const Arguments& a) {
   std::error_code error;
   fs::create_directories(a.output, error);
   if (error) throw InputError(a.output.string(), "", "cannot be created: " + error.message());
 }
 
 void run(const Arguments& a) {
-  const SessionReader session(a.session);
   check_options(a);
+  const SessionReader session(a.session);
+  create_output_folder(a);
   const Progress progress = progress_bar();
   std::map<std::string, double> seconds;
   const ResponseCurve response =

@@ -103,7 +103,7 @@ TEST(Bouguet, AgreesWithOpenCvOnRealPictures) {
       for (int x = 0; x < picture.width; ++x) grey.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(picture.at(x, y));
     std::vector<cv::Point2f> corners;
     if (!cv::findChessboardCorners(grey, {9, 6}, corners)) continue;
-    cv::cornerSubPix(grey, corners, {11, 11}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.01});
+    cv::cornerSubPix(grey, corners, {5, 5}, {-1, -1}, {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 30, 0.01});
     TargetView view;
     view.name = entry.path().filename();
     for (int row = 0; row < 6; row += 2)

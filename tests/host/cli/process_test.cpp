@@ -23,7 +23,21 @@ using test::run_command;
 const char* const mirrorfield = MF_BINARY_DIR "/mirrorfield";
 const char* const simulator = MF_BINARY_DIR "/mirrorfield-sim";
 
-// RMS of the difference over the pixels where the object changes the picture by a tenth or more.
+// Means of 4 × 4 pixels: the truth is path traced with few samples, and its noise is not our error.
+ImageF blocks_of(const ImageF& picture) {
+  constexpr int side = 4;
+  ImageF blocks(picture.width / side, picture.height / side, picture.channels);
+  for (int y = 0; y < blocks.height; ++y)
+    for (int x = 0; x < blocks.width; ++x)
+      for (int c = 0; c < picture.channels; ++c) {
+        float sum = 0;
+        for (int i = 0; i < side * side; ++i) sum += picture.at(side * x + i % side, side * y + i / side, c);
+        blocks.at(x, y, c) = sum / (side * side);
+      }
+  return blocks;
+}
+
+// RMS of the difference over the blocks where the object changes the picture by a tenth or more.
 double rms_where_changed(const ImageF& picture, const ImageF& truth, const ImageF& plate) {
   double sum = 0;
   double count = 0;
@@ -69,13 +83,13 @@ TEST(Process, FromASimulatedRecordingToALitPicture) {
                          "-o", out + "/composite.exr"})
                 .exit_code,
             0);
-  const ImageF plate = read_exr(truth + "/plate0.exr");
-  const ImageF expected = read_exr(truth + "/knot0.exr");
-  const double ours = rms_where_changed(read_exr(out + "/composite.exr"), expected, plate);
+  const ImageF plate = blocks_of(read_exr(truth + "/plate0.exr"));
+  const ImageF expected = blocks_of(read_exr(truth + "/knot0.exr"));
+  const double ours = rms_where_changed(blocks_of(read_exr(out + "/composite.exr")), expected, plate);
   const double without = rms_where_changed(plate, expected, plate);
   RecordProperty("composite_rms", std::to_string(ours));
   RecordProperty("plate_rms", std::to_string(without));
-  EXPECT_LT(ours, 0.4 * without) << "composite " << ours << ", bare plate " << without;
+  EXPECT_LT(ours, 0.35 * without) << "composite " << ours << ", bare plate " << without;
 }
 
 TEST(Process, SaysInOneLineWhatIsMissing) {
