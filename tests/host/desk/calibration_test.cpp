@@ -1,52 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The path-traced desk capture through the program as a user runs it, against its truth.
-#include <gtest/gtest.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <nlohmann/json.hpp>
+#include <iostream>
 #include <numbers>
 
 #include "common/json_file.h"
 #include "host/calibration/calibration.h"
+#include "tests/host/desk/desk_run.h"
+#include "tests/host/desk/desk_truth.h"
 
-namespace mf {
+namespace mf::test {
 namespace {
-
-const std::filesystem::path desk = std::filesystem::path(MF_SHARED_DATA) / "desk";
 
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
   return values[values.size() / 2];
 }
 
-class DeskCalibration : public ::testing::Test {
+class DeskCalibration : public DeskRun {
  protected:
-  static void SetUpTestSuite() {
-    if (!std::filesystem::exists(desk)) return;
-    folder_ = std::filesystem::temp_directory_path() / ("mf_desk_calibration_" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder_);
-    const std::string program = std::string(MF_BINARY_DIR) + "/mirrorfield ";
-    const std::string session = (folder_ / "S").string();
-    ran_ = std::system((program + "import " + desk.string() + " -o " + session + " > /dev/null && " + program +
-                        "photometry " + session + " > /dev/null && " + program + "calibrate " + session + " --json > " +
-                        (folder_ / "summary.json").string())
-                           .c_str()) == 0;
-  }
-  static void TearDownTestSuite() {
-    if (!folder_.empty()) std::filesystem::remove_all(folder_);
-  }
   void SetUp() override {
-    if (folder_.empty()) GTEST_SKIP() << desk << " is absent";
-    ASSERT_TRUE(ran_) << "import, photometry and calibrate must succeed";
-    found_ = read_calibration(folder_ / "S" / "calibration.json");
-    truth_ = read_json_file(desk / "truth" / "calibration.json");
+    DeskRun::SetUp();
+    if (IsSkipped() || HasFatalFailure()) return;
+    found_ = read_calibration(session() / "calibration.json");
+    truth_ = read_json_file(desk_folder() / "truth" / "calibration.json");
   }
-  static inline std::filesystem::path folder_;
-  static inline bool ran_ = false;
   Calibration found_;
   nlohmann::json truth_;
 };
@@ -58,11 +37,13 @@ TEST_F(DeskCalibration, CameraIsRight) {
   EXPECT_NEAR(found_.camera.fy(), f, 1e-3 * f);
   EXPECT_LT(std::hypot(found_.camera.cx() - cx, found_.camera.cy() - cy), 0.5);
   EXPECT_LE(found_.rms_px, 0.2);
+  std::cout << "camera: focal length off by " << 100 * std::abs(found_.camera.fx() / f - 1) << " %, principal point by "
+            << std::hypot(found_.camera.cx() - cx, found_.camera.cy() - cy) << " px, RMS " << found_.rms_px << " px\n";
 }
 
 TEST_F(DeskCalibration, MirrorPosesAndWorldAreRight) {
   const Rigid3 cam_from_world = rigid3_from_json(truth_.at("cam_from_world"), "cam_from_world", "truth");
-  const nlohmann::json names = read_json_file(desk / "frames.json");
+  const nlohmann::json names = read_json_file(desk_folder() / "frames.json");
   ASSERT_EQ(found_.frames.size(), names.size());
   std::vector<double> rotation_deg, position_mm;
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -74,6 +55,10 @@ TEST_F(DeskCalibration, MirrorPosesAndWorldAreRight) {
     position_mm.push_back(1e3 * (found_.frames[i].cam_from_mirror.translation - truth.translation).norm());
   }
   RecordProperty("frames_posed", static_cast<int>(rotation_deg.size()));
+  std::cout << "poses: " << rotation_deg.size() << " of " << names.size() << ", median " << median(rotation_deg)
+            << " deg, " << median(position_mm) << " mm, worst "
+            << *std::max_element(rotation_deg.begin(), rotation_deg.end()) << " deg, "
+            << *std::max_element(position_mm.begin(), position_mm.end()) << " mm\n";
   EXPECT_GE(static_cast<double>(rotation_deg.size()), 0.96 * static_cast<double>(names.size()));
   EXPECT_LE(median(rotation_deg), 0.03);
   EXPECT_LE(median(position_mm), 0.3);
@@ -85,12 +70,12 @@ TEST_F(DeskCalibration, MirrorPosesAndWorldAreRight) {
 }
 
 TEST_F(DeskCalibration, SummarySaysWhatWasMeasured) {
-  const nlohmann::json summary = read_json_file(folder_ / "summary.json");
-  EXPECT_EQ(summary.at("frames").get<std::size_t>(), found_.frames.size());
-  EXPECT_EQ(summary.at("used").get<std::size_t>() + summary.at("unposed").size(), found_.frames.size());
-  for (const nlohmann::json& frame : summary.at("unposed"))
+  const nlohmann::json& measured = summary("calibrate");
+  EXPECT_EQ(measured.at("frames").get<std::size_t>(), found_.frames.size());
+  EXPECT_EQ(measured.at("used").get<std::size_t>() + measured.at("unposed").size(), found_.frames.size());
+  for (const nlohmann::json& frame : measured.at("unposed"))
     EXPECT_FALSE(frame.at("why_not").get<std::string>().empty());
 }
 
 }  // namespace
-}  // namespace mf
+}  // namespace mf::test

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What each proxy is worth on the path-traced desk capture: one session, the same poses and response, the same errors
+// against truth; and both back ends on the same composite. The capture must lie beside the checkout.
+// `plane` is the baseline: the paper's way (Ihrke et al. 2008).
+#include <benchmark/benchmark.h>
+
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "host/io/exr.h"
+#include "tests/host/desk/desk_truth.h"
+#include "tests/support/run_command.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mf {
+namespace {
+
+namespace fs = std::filesystem;
+
+test::CommandOutcome mirrorfield(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), MF_BINARY_DIR "/mirrorfield");
+  return test::run_command(arguments);
+}
+
+// The calibrated session and one light field a proxy, made when first asked for.
+class Desk {
+ public:
+  Desk() {
+    ready_ = fs::exists(test::desk_folder()) &&
+             mirrorfield({"import", test::desk_folder().string(), "-o", session_}).exit_code == 0 &&
+             mirrorfield({"photometry", session_}).exit_code == 0 &&
+             mirrorfield({"calibrate", session_}).exit_code == 0;
+  }
+  [[nodiscard]] bool ready() const { return ready_; }
+
+  // Path of the field; empty on failure.
+  [[nodiscard]] std::string field(const std::string& proxy) {
+    const std::string file = folder_ / (proxy + ".lf.exr");
+    if (fs::exists(file)) return file;
+    const bool made = mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions", "2500", "--size",
+                                   "128", "--proxy", proxy})
+                          .exit_code == 0;
+    return made ? file : std::string();
+  }
+
+  [[nodiscard]] ImageF probe(const std::string& field) {
+    const std::string file = folder_ / "probe.exr";
+    (void)mirrorfield({"probe", field, "--at", "0", "0", "0.1", "--for", "blender", "-o", file});
+    return read_exr(file);
+  }
+  [[nodiscard]] ImageF composite(const std::string& field, int view, const std::string& backend) {
+    const fs::path truth = test::desk_folder() / "truth";
+    const std::string file = folder_ / "composite.exr";
+    const std::string plate = truth / plate_name(view);
+    (void)mirrorfield({"composite", field, truth / "suzanne.obj", "--plate", plate, "--cameras", truth / "views.json",
+                       "--view", std::to_string(view), "--albedo", "0.7", "--backend", backend, "-o", file});
+    return read_exr(file);
+  }
+  static std::string plate_name(int view) { return "plate" + std::to_string(view) + ".exr"; }
+
+ private:
+  test::TemporaryFolder folder_;
+  std::string session_ = folder_ / "session";
+  bool ready_ = false;
+};
+
+Desk& desk() {
+  static Desk desk;
+  return desk;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double psnr_of_view(const ImageF& picture, int view) {
+  const fs::path truth = test::desk_folder() / "truth";
+  return test::composite_psnr(picture, read_exr(truth / ("suzanne" + std::to_string(view) + ".exr")),
+                              read_exr(truth / Desk::plate_name(view)));
+}
+
+void proxy(benchmark::State& state, const std::string& name) {
+  if (!desk().ready()) return state.SkipWithError("the desk capture is absent");
+  std::string field;
+  for (auto _ : state) field = desk().field(name);
+  if (field.empty()) return state.SkipWithError("resample failed");
+  const test::ProbeError probe =
+      test::probe_error(desk().probe(field), read_exr(test::desk_folder() / "truth" / "probe_0_0_0.1.exr"));
+  const test::TableError table = test::table_error(read_light_field(field));
+  state.counters["probe_stop"] = probe.median_abs_stop;
+  state.counters["probe_irradiance"] = probe.irradiance_ratio;
+  state.counters["lamp_deg"] = probe.lamp_deg;
+  state.counters["table_correlation"] = table.correlation;
+  state.counters["table_rms"] = table.relative_rms;
+  state.counters["table_mean"] = table.mean_ratio;
+  for (const int view : {0, 1})
+    state.counters["psnr" + std::to_string(view)] = psnr_of_view(desk().composite(field, view, "cpu"), view);
+}
+BENCHMARK_CAPTURE(proxy, plane, "plane")->Unit(benchmark::kSecond)->Iterations(1);
+BENCHMARK_CAPTURE(proxy, distant_sphere, "sphere:inf")->Unit(benchmark::kSecond)->Iterations(1);
+BENCHMARK_CAPTURE(proxy, best_sphere, "sphere")->Unit(benchmark::kSecond)->Iterations(1);
+BENCHMARK_CAPTURE(proxy, automatic, "auto")->Unit(benchmark::kSecond)->Iterations(1);
+
+// RMS of the difference over the mean, over all but the `worst` share of the pixels that the object changes.
+double relative_rms(const ImageF& a, const ImageF& b, const ImageF& plate, double worst) {
+  std::vector<double> squares;
+  double sum = 0;
+  for (std::size_t i = 0; i < a.data.size(); ++i) {
+    if (std::abs(b.data[i] - plate.data[i]) <= 0.1F * std::max(plate.data[i], 0.05F)) continue;
+    squares.push_back(std::pow(static_cast<double>(a.data[i] - b.data[i]), 2));
+    sum += static_cast<double>(b.data[i]);
+  }
+  const double mean = sum / static_cast<double>(squares.size());
+  std::sort(squares.begin(), squares.end());
+  squares.resize(squares.size() - static_cast<std::size_t>(worst * static_cast<double>(squares.size())));
+  double total = 0;
+  for (const double s : squares) total += s;
+  return std::sqrt(total / static_cast<double>(squares.size())) / mean;
+}
+
+void backends(benchmark::State& state) {
+  if (!desk().ready()) return state.SkipWithError("the desk capture is absent");
+  const std::string field = desk().field("auto");
+  double cpu_s = 0, gl_s = 0;
+  ImageF cpu, gl;
+  for (auto _ : state) {
+    auto start = std::chrono::steady_clock::now();
+    cpu = desk().composite(field, 0, "cpu");
+    cpu_s = seconds_since(start);
+    start = std::chrono::steady_clock::now();
+    gl = desk().composite(field, 0, "gl");
+    gl_s = seconds_since(start);
+  }
+  const ImageF plate = read_exr(test::desk_folder() / "truth" / Desk::plate_name(0));
+  state.counters["cpu_s"] = cpu_s;
+  state.counters["gl_s"] = gl_s;
+  state.counters["ratio"] = gl_s / cpu_s;
+  state.counters["psnr_cpu"] = psnr_of_view(cpu, 0);
+  state.counters["psnr_gl"] = psnr_of_view(gl, 0);
+  state.counters["rms_all"] = relative_rms(gl, cpu, plate, 0);
+  state.counters["rms_off_edges"] = relative_rms(gl, cpu, plate, 0.03);
+}
+BENCHMARK(backends)->Unit(benchmark::kSecond)->Iterations(1);
+
+}  // namespace
+}  // namespace mf
+
+BENCHMARK_MAIN();
