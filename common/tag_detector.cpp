@@ -54,7 +54,7 @@ class Stretch {
     if (!(v > 0) || !(knee_ > 0)) return 0;
     const float x = v / knee_;
     const float level = x <= 1 ? knee_level * x : knee_level + shoulder_ * std::log(x);
-    return static_cast<std::uint8_t>(std::min(level, 255.F) + 0.5F);
+    return static_cast<std::uint8_t>(std::lround(std::min(level, 255.F)));
   }
 
  private:

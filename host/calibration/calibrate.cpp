@@ -94,6 +94,7 @@ struct Work {
 void find_homography(Work& work, double threshold_px) {
   const std::vector<std::size_t> plane = largest_plane(work.view);
   std::vector<TagSighting> tags;
+  tags.reserve(plane.size());
   for (const std::size_t i : plane) tags.push_back(work.view.tags[i]);
   const std::optional<RobustHomography> found = robust_homography(tags, threshold_px);
   if (!found) return;

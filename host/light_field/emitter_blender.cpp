@@ -128,18 +128,19 @@ void draw_mask(const std::vector<FieldView>& views, const PlaneRectangle& rectan
       const ProxyPoint q = e.occluder_point(m).homogeneous();
       float sum = 0, weights = 0;
       for (const FieldView& view : views) {
-        constexpr float well_inside = 0.9F;  // of the radius: at the rim the lamp itself ends
+        constexpr float most = 1.5F;         // noise goes both ways: it must average out
+        constexpr float well_inside = 0.7F;  // of the radius: pixels at the rim show half of what is beside the lamp
         if (!e.met_at(view.centre_in_world, ray_to(q, view.centre_in_world).normalized(), well_inside)) continue;
         const Eigen::Vector3f pixel = pixel_of(view, q);
         if (pixel.z() <= 0) continue;
         const Eigen::Vector4f seen = view.fetch(level_for_angle(view, q, texel.mean() * (1 - e.occluder_share)),
                                                 pixel.x() / pixel.z(), pixel.y() / pixel.z());
         if (seen.w() < smallest_weight) continue;
-        sum += std::min(seen.head<3>().sum() / full, seen.w());
+        sum += std::min(seen.head<3>().sum() / full, most * seen.w());
         weights += seen.w();
       }
       if (weights <= 0) continue;
-      e.mask.at(x, y, 0) = sum / weights;
+      e.mask.at(x, y, 0) = std::min(sum / weights, 1.0F);
       e.mask.at(x, y, 1) = std::min(weights, 1.0F);
     }
   });
@@ -158,7 +159,8 @@ std::vector<Eigen::Vector3f> points_of(const PlaneRectangle& rectangle) {
   return points;
 }
 
-// The emitter's own radiance: the upper quartile of what views show at its centre, since occluders only darken.
+// The emitter's own radiance: the median of what views show of its centre where nothing hides it, since occluders only
+// darken.
 Eigen::Vector3f unhidden_radiance(const std::vector<FieldView>& views, const Emitter& e) {
   std::vector<std::pair<float, Eigen::Vector3f>> seen_by;
   for (const FieldView& view : views) {
@@ -171,10 +173,11 @@ Eigen::Vector3f unhidden_radiance(const std::vector<FieldView>& views, const Emi
     if (seen.w() > 0.5F) seen_by.emplace_back(log_luminance(seen), seen.head<3>() / seen.w());
   }
   if (seen_by.empty()) return Eigen::Vector3f::Zero();
-  const auto upper = seen_by.begin() + static_cast<std::ptrdiff_t>(3 * seen_by.size() / 4);
-  std::nth_element(seen_by.begin(), upper, seen_by.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  return upper->second;
+  std::sort(seen_by.begin(), seen_by.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  constexpr float half = 1;  // stop: darker than this below the upper quartile is hidden at least in part
+  const float upper = seen_by[3 * seen_by.size() / 4].first;
+  const auto lit = std::find_if(seen_by.begin(), seen_by.end(), [&](const auto& s) { return s.first > upper - half; });
+  return (lit + (seen_by.end() - lit) / 2)->second;
 }
 
 }  // namespace

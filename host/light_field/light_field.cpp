@@ -28,4 +28,15 @@ Eigen::Vector4f sample_tile(const LightField& field, std::size_t direction, cons
   return {sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), sum.w()};
 }
 
+ImageF plane_irradiance(const LightField& field) {
+  ImageF map(field.resolution, field.resolution, 3);
+  for (std::size_t i = 0; i < field.directions.size(); ++i) {
+    const Eigen::Vector4f* tile = field.tile(i);
+    const float weight = field.directions.solid_angles_sr[i] * field.directions.directions[i].z();
+    for (std::size_t t = 0; t < field.texel_count(); ++t)
+      for (int c = 0; c < 3; ++c) map.data[3 * t + static_cast<std::size_t>(c)] += weight * tile[t][c];
+  }
+  return map;
+}
+
 }  // namespace mf

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/image.h"
 #include "common/rigid3.h"
 #include "host/light_field/direction_set.h"
 #include "host/light_field/shaded_emitter.h"
@@ -50,6 +51,9 @@ struct LightField {
 // Bilinear in p (plane coordinates, metres) within one direction's tile; p outside the rectangle is clamped to it.
 // Returns red, green, blue weighted by confidence, and the confidence.
 [[nodiscard]] Eigen::Vector4f sample_tile(const LightField&, std::size_t direction, const Eigen::Vector2f& p_in_plane);
+
+// Irradiance of the bare plane at each texel of a tile, three channels: E(p) = Σ L(p, ω) ω_z ΔΩ.
+[[nodiscard]] ImageF plane_irradiance(const LightField&);
 
 // `*.lf.exr`: one tiled OpenEXR, one tile a direction, tiles in rows of ceil(√n); attributes as docs/light_field.md.
 // Written aside and renamed. Both throw InputError naming the file (and the attribute).

@@ -86,6 +86,28 @@ bool TileResampler::near_emitter(int bx, int by) const {
   return false;
 }
 
+// Mean over the cell's parts of colour · weight, and of weight. Parts beside an emitter of which no view speaks (each
+// shows its glare there) are as those that are known, never as the emitter itself.
+Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p, float part_angle) const {
+  Eigen::Vector4f on_emitter = Eigen::Vector4f::Zero(), beside = Eigen::Vector4f::Zero();
+  float solid_angle = 0, all_beside = 0, unknown_beside = 0;
+  for (const CellSample& part : cell_.fine_parts) {
+    const Eigen::Vector4f seen = emitters_.radiance(p, part.direction, part_angle, candidates_);
+    const Eigen::Vector4f weighted = part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+    solid_angle += part.solid_angle_sr;
+    if (emitters_.unhidden(p, part.direction)) {
+      on_emitter += weighted;
+      continue;
+    }
+    beside += weighted;
+    all_beside += part.solid_angle_sr;
+    if (seen.w() <= 0) unknown_beside += part.solid_angle_sr;
+  }
+  if (unknown_beside < all_beside) beside *= all_beside / (all_beside - unknown_beside);
+  if (unknown_beside == all_beside) beside.w() = all_beside;  // nothing known: dark, against the emitter
+  return (on_emitter + beside) / solid_angle;
+}
+
 // Each part of the cell is blended by itself, at the block's vertices; texels are interpolated.
 void TileResampler::fill_near_emitter(int bx, int by, Eigen::Vector4f* tile) {
   std::array<Eigen::Vector4f, patch * patch> mean;
@@ -94,14 +116,7 @@ void TileResampler::fill_near_emitter(int bx, int by, Eigen::Vector4f* tile) {
     const int x = static_cast<int>(n) % patch, y = static_cast<int>(n) / patch;
     const Vertex& v =
         vertex_[static_cast<std::size_t>((by * block_vertices + y) * vertices_ + bx * block_vertices + x)];
-    Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · weight, weight
-    float solid_angle = 0;
-    for (const CellSample& part : cell_.fine_parts) {
-      const Eigen::Vector4f seen = emitters_.radiance(v.p, part.direction, part_angle, candidates_);
-      sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
-      solid_angle += part.solid_angle_sr;
-    }
-    mean[n] = sum / solid_angle;
+    mean[n] = mean_near_emitter(v.p, part_angle);
   }
   const int size = field_.resolution;
   for (int y = by * block_step; y < std::min(size, (by + 1) * block_step); ++y)

@@ -48,6 +48,7 @@ class TileResampler {
   void fetch_candidates(int block_x, int block_y);
   [[nodiscard]] Eigen::Vector4f blend(int x, int y);
   [[nodiscard]] bool near_emitter(int block_x, int block_y) const;
+  [[nodiscard]] Eigen::Vector4f mean_near_emitter(const Eigen::Vector3f& p, float part_angle) const;
   void fill_near_emitter(int block_x, int block_y, Eigen::Vector4f* tile);
 
   [[nodiscard]] Eigen::Vector3f point(float texel_x, float texel_y) const;

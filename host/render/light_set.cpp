@@ -117,17 +117,6 @@ void append_ground_light(LightSet& set, const PlaneImage& outgoing_radiance, int
   }
 }
 
-ImageF plane_irradiance(const LightField& field) {
-  ImageF map(field.resolution, field.resolution, 3);
-  for (std::size_t i = 0; i < field.directions.size(); ++i) {
-    const Eigen::Vector4f* tile = field.tile(i);
-    const float weight = field.directions.solid_angles_sr[i] * field.directions.directions[i].z();
-    for (std::size_t t = 0; t < field.texel_count(); ++t)
-      for (int c = 0; c < 3; ++c) map.data[3 * t + static_cast<std::size_t>(c)] += weight * tile[t][c];
-  }
-  return map;
-}
-
 Eigen::Vector4f sample(const PlaneImage& image, const Eigen::Vector2f& p) {
   const auto coordinate = [](float fraction, int size) {
     return std::clamp(fraction * static_cast<float>(size) - 0.5F, 0.F, static_cast<float>(size - 1));

@@ -62,9 +62,6 @@ struct ImportanceOptions {
 // What a plane sends up, as parallel lights from below: `count` directions over the lower hemisphere, one image.
 void append_ground_light(LightSet&, const PlaneImage& outgoing_radiance, int count);
 
-// Irradiance of the bare plane at each texel of a tile, three channels: Σ L(p, ω) ω_z ΔΩ.
-[[nodiscard]] ImageF plane_irradiance(const LightField&);
-
 // Bilinear lookup; see PlaneImage.
 [[nodiscard]] Eigen::Vector4f sample(const PlaneImage&, const Eigen::Vector2f& p);
 

@@ -44,17 +44,6 @@ HemisphereDisc draw_hemisphere(const LightField& field, int size_px) {
   return disc;
 }
 
-ImageF irradiance_map(const LightField& field) {
-  ImageF map(field.resolution, field.resolution, 3);
-  for (std::size_t d = 0; d < field.directions.size(); ++d) {
-    const float weight = field.directions.directions[d].z() * field.directions.solid_angles_sr[d];
-    const Eigen::Vector4f* tile = field.tile(d);
-    for (std::size_t i = 0; i < field.texel_count(); ++i)
-      for (std::size_t c = 0; c < 3; ++c) map.data[3 * i + c] += weight * tile[i][static_cast<Eigen::Index>(c)];
-  }
-  return map;
-}
-
 double covered_share(const LightField& field) {
   double covered = 0;
   double all = 0;

@@ -16,9 +16,6 @@ struct HemisphereDisc {
 };
 [[nodiscard]] HemisphereDisc draw_hemisphere(const LightField&, int size_px);
 
-// E(p) = Σ L(p, ω) (n·ω) ΔΩ(ω) for every texel: three channels, first row at the largest y.
-[[nodiscard]] ImageF irradiance_map(const LightField&);
-
 // Share of the cosine-weighted hemisphere that views looked at, mean over the plane, 0 to 1.
 [[nodiscard]] double covered_share(const LightField&);
 

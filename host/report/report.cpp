@@ -170,7 +170,7 @@ std::string hemisphere(const ReportInput& in) {
 }
 
 std::string light(const ReportInput& in) {
-  const ImageF map = irradiance_map(in.field);
+  const ImageF map = plane_irradiance(in.field);
   double lowest = INFINITY;
   double highest = 0;
   for (std::size_t i = 1; i < map.data.size(); i += 3) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/light_field/emitters.h"
 #include "host/light_field/probe.h"
 #include "host/light_field/view_rays.h"
 #include "tests/host/light_field/synthetic_views.h"
@@ -84,6 +85,24 @@ TEST(Resample, SmallLampKeepsItsEnergy) {
       }
     EXPECT_NEAR(ours / truth, 1, 0.1) << directions;
   }
+}
+
+// Leaves hide a third and more of the lamp in most views, and half of them always on one side.
+TEST(Emitters, ALampBehindLeavesIsFoundWhole) {
+  const Globe globe;
+  const auto leaf = [](const Eigen::Vector3f& o, const Eigen::Vector3f& d) {  // striped, halfway to the lamp
+    constexpr float height = 0.45F;
+    const Eigen::Vector3f at = o + (height - o.z()) / d.z() * d;
+    const bool hides = std::sin(70 * at.x()) + std::sin(45 * at.y() + 1) > 0.3F;
+    return o.z() < height && d.z() > 0 && hides;
+  };
+  const auto views = testing::analytic_views(200, 0.25F, 128, [&](const auto& o, const auto& d) -> Eigen::Vector3f {
+    return leaf(o, d) ? Eigen::Vector3f::Constant(0.02F) : globe(o, d);
+  });
+  const std::vector<Emitter> found = find_emitters(views);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_LT((found[0].position - globe.centre).norm(), 0.02F);
+  EXPECT_NEAR(found[0].radius_m, globe.radius, 0.06F * globe.radius);
 }
 
 TEST(Resample, PhotoConsistencyFindsTheDistance) {

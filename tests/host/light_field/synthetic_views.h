@@ -30,12 +30,17 @@ inline FieldView analytic_view(const Eigen::Vector3f& centre, const Eigen::Vecto
   PremultipliedImage image(size_px, size_px);
   for (int v = 0; v < size_px; ++v)
     for (int u = 0; u < size_px; ++u) {
-      const Eigen::Vector3f ray((static_cast<float>(u) + 0.5F - middle) / focal,
-                                (static_cast<float>(v) + 0.5F - middle) / focal, 1);
+      constexpr int n = 4;  // a pixel integrates: n × n rays
+      Eigen::Vector3f colour = Eigen::Vector3f::Zero();
+      for (int i = 0; i < n * n; ++i) {
+        const float du = (static_cast<float>(i % n) + 0.5F) / n, dv = (static_cast<float>(i / n) + 0.5F) / n;
+        const Eigen::Vector3f ray((static_cast<float>(u) + du - middle) / focal,
+                                  (static_cast<float>(v) + dv - middle) / focal, 1);
+        colour += light(centre, (view_from_world.transpose() * ray).normalized()) / (n * n);
+      }
       const float edge =
           static_cast<float>(std::min({u, v, size_px - 1 - u, size_px - 1 - v})) / (0.1F * static_cast<float>(size_px));
       const float a = std::min(1.0F, edge);
-      const Eigen::Vector3f colour = light(centre, (view_from_world.transpose() * ray).normalized());
       image.at(u, v) << colour * a, a;
     }
   view.levels.push_back(image);

@@ -32,7 +32,7 @@ LightField field_of(const Seen& seen) {
 }
 
 TEST(FieldPictures, ConstantLightGivesPiTimesItsRadiance) {
-  const ImageF map = irradiance_map(field_of([](const auto&) { return true; }));
+  const ImageF map = plane_irradiance(field_of([](const auto&) { return true; }));
   ASSERT_EQ(map.width, 4);
   for (std::size_t i = 0; i < map.data.size(); ++i)
     EXPECT_NEAR(map.data[i], std::numbers::pi * static_cast<double>(1 + i % 3), 0.01 * std::numbers::pi * 3);
