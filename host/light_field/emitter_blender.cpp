@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/light_field/emitter_blender.h"
 
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "host/blending/view_weights.h"
+#include "host/light_field/occluder_mask.h"
 #include "host/light_field/view_rays.h"
 
 namespace mf {
@@ -33,7 +31,7 @@ void ask_about_emitter(const std::vector<FieldView>& views, std::span<const std:
                        const ShadedEmitter& e, const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
                        float angle_rad, std::vector<Answer>& answers) {
   const float along = (e.emitter.position - p).dot(direction);
-  const ProxyPoint x = proxy_point(p, direction, 1 / (e.occluder_share * along));
+  const ProxyPoint x = proxy_point(p, direction, 1 / (e.share_along(p, direction) * along));
   for (const std::uint32_t v : candidates) {
     const FieldView& view = views[v];
     if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized())) continue;
@@ -45,118 +43,8 @@ void ask_about_emitter(const std::vector<FieldView>& views, std::span<const std:
   }
 }
 
-// Points on the disc under which the emitter is seen from p: directions.
-std::vector<Eigen::Vector3f> directions_to(const Emitter& e, const Eigen::Vector3f& p) {
-  const Eigen::Vector3f to = (e.position - p).normalized(), x = to.unitOrthogonal(), y = to.cross(x);
-  std::vector<Eigen::Vector3f> directions{to};
-  for (int i = 0; i < 6; ++i) {
-    const float a = static_cast<float>(i) * 1.0471976F;
-    directions.push_back((e.position + 0.6F * e.radius_m * (std::cos(a) * x + std::sin(a) * y) - p).normalized());
-  }
-  return directions;
-}
-
 float log_luminance(const Eigen::Vector4f& seen) {
   return std::log2(std::max((0.2126F * seen.x() + 0.7152F * seen.y() + 0.0722F * seen.z()) / seen.w(), 1e-3F));
-}
-
-// How much the views nearest to a ray differ about the emitter's being hidden; stops.
-double disagreement(const std::vector<FieldView>& views, const ShadedEmitter& e,
-                    const std::vector<Eigen::Vector3f>& points) {
-  constexpr float angle_rad = 0.006F;
-  constexpr std::size_t nearest = 5;
-  std::vector<std::uint32_t> all(views.size());
-  std::iota(all.begin(), all.end(), 0U);
-  double sum = 0, count = 0;
-  std::vector<Answer> answers;
-  for (const Eigen::Vector3f& p : points)
-    for (const Eigen::Vector3f& d : directions_to(e.emitter, p)) {
-      answers.clear();
-      ask_about_emitter(views, all, e, p, d, angle_rad, answers);
-      if (answers.size() < nearest) continue;
-      std::partial_sort(answers.begin(), answers.begin() + nearest, answers.end(),
-                        [](const Answer& a, const Answer& b) { return a.penalty < b.penalty; });
-      double mean = 0, square = 0;
-      for (std::size_t i = 0; i < nearest; ++i) {
-        const double v = static_cast<double>(log_luminance(answers[i].seen));
-        mean += v / nearest;
-        square += v * v / nearest;
-      }
-      sum += std::sqrt(std::max(0.0, square - mean * mean));
-      count += 1;
-    }
-  return count > 0 ? sum / count : 0;
-}
-
-// The share of least disagreement: tried evenly, then more finely about the best.
-float find_occluder(const std::vector<FieldView>& views, const ShadedEmitter& e,
-                    const std::vector<Eigen::Vector3f>& points) {
-  const auto best_of = [&](float first, float step, int count) {
-    std::vector<double> scores(static_cast<std::size_t>(count));
-    tbb::parallel_for(std::size_t{0}, scores.size(), [&](std::size_t i) {
-      ShadedEmitter tried = e;
-      tried.occluder_share = first + step * static_cast<float>(i);
-      scores[i] = disagreement(views, tried, points);
-    });
-    return first + step * static_cast<float>(std::min_element(scores.begin(), scores.end()) - scores.begin());
-  };
-  const float coarse = best_of(0.2F, 0.06F, 13);
-  return best_of(coarse - 0.04F, 0.02F, 5);
-}
-
-// Every view whose ray through the occluder's point meets the emitter votes on how much light passes there.
-void draw_mask(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, ShadedEmitter& e) {
-  constexpr int side = 192;
-  constexpr float margin_m = 0.06F;  // rays to the emitter's rim pass the occluder beside its centre's shadow
-  e.mask_min_m = (rectangle.world_from_plane * Eigen::Vector3d(rectangle.min_m.x(), rectangle.min_m.y(), 0))
-                     .head<2>()
-                     .cast<float>()
-                     .array() -
-                 margin_m;
-  e.mask_max_m = (rectangle.world_from_plane * Eigen::Vector3d(rectangle.max_m.x(), rectangle.max_m.y(), 0))
-                     .head<2>()
-                     .cast<float>()
-                     .array() +
-                 margin_m;
-  e.mask = ImageF(side, side, 2);
-  const Eigen::Vector2f texel = (e.mask_max_m - e.mask_min_m) / side;
-  const float full = std::max(e.radiance.sum(), 1e-6F);
-  tbb::parallel_for(0, side, [&](int y) {
-    for (int x = 0; x < side; ++x) {
-      const Eigen::Vector2f m(e.mask_min_m.x() + (static_cast<float>(x) + 0.5F) * texel.x(),
-                              e.mask_max_m.y() - (static_cast<float>(y) + 0.5F) * texel.y());
-      const ProxyPoint q = e.occluder_point(m).homogeneous();
-      float sum = 0, weights = 0;
-      for (const FieldView& view : views) {
-        constexpr float most = 1.5F;         // noise goes both ways: it must average out
-        constexpr float well_inside = 0.7F;  // of the radius: pixels at the rim show half of what is beside the lamp
-        if (!e.met_at(view.centre_in_world, ray_to(q, view.centre_in_world).normalized(), well_inside)) continue;
-        const Eigen::Vector3f pixel = pixel_of(view, q);
-        if (pixel.z() <= 0) continue;
-        const Eigen::Vector4f seen = view.fetch(level_for_angle(view, q, texel.mean() * (1 - e.occluder_share)),
-                                                pixel.x() / pixel.z(), pixel.y() / pixel.z());
-        if (seen.w() < smallest_weight) continue;
-        sum += std::min(seen.head<3>().sum() / full, most * seen.w());
-        weights += seen.w();
-      }
-      if (weights <= 0) continue;
-      e.mask.at(x, y, 0) = std::min(sum / weights, 1.0F);
-      e.mask.at(x, y, 1) = std::min(weights, 1.0F);
-    }
-  });
-}
-
-// A coarse grid of the plane, world.
-std::vector<Eigen::Vector3f> points_of(const PlaneRectangle& rectangle) {
-  constexpr int side = 12;
-  std::vector<Eigen::Vector3f> points;
-  for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x) {
-      const Eigen::Vector2d p =
-          rectangle.min_m + Eigen::Vector2d((x + 0.5) / side, (y + 0.5) / side).cwiseProduct(rectangle.size_m());
-      points.push_back((rectangle.world_from_plane * Eigen::Vector3d(p.x(), p.y(), 0)).cast<float>());
-    }
-  return points;
 }
 
 // The emitter's own radiance: the median of what views show of its centre where nothing hides it, since occluders only
@@ -190,8 +78,7 @@ EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surrou
     shaded.emitter = emitter;
     shaded.radiance = unhidden_radiance(views, emitter);
     shaded.plane_height_m = static_cast<float>(rectangle.world_from_plane.translation.z());
-    shaded.occluder_share = find_occluder(views, shaded, points_of(rectangle));
-    draw_mask(views, rectangle, shaded);
+    draw_occluders(views, rectangle, shaded);
     emitters_.push_back(std::move(shaded));
   }
 }

@@ -213,7 +213,7 @@ std::vector<NamedMap> maps_of(const LightField& field) {
   if (!s.panorama.empty()) maps.push_back({"panorama", {"R", "G", "B", "A"}, &s.panorama});
   for (std::size_t i = 0; i < field.emitters.size(); ++i)
     maps.push_back(
-        {fmt::format("emitter{}", i), {"visibility", "weight"}, &field.emitters[i].mask, &field.emitters[i]});
+        {fmt::format("emitter{}", i), {"visibility", "weight", "share"}, &field.emitters[i].mask, &field.emitters[i]});
   return maps;
 }
 
@@ -299,7 +299,7 @@ void read_maps(Imf::MultiPartInputFile& file, LightField& field, const std::stri
     if (name == "panorama") s.panorama = read_map(file, part, {"R", "G", "B", "A"});
     if (!name.starts_with("emitter")) continue;
     field.emitters.push_back(emitter_of(file.header(part), path));
-    field.emitters.back().mask = read_map(file, part, {"visibility", "weight"});
+    field.emitters.back().mask = read_map(file, part, {"visibility", "weight", "share"});
   }
 }
 

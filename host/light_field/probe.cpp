@@ -81,48 +81,60 @@ namespace {
 
 constexpr int part_splits = 3;  // 48 parts a cell: at 2500 directions each is about a pixel of the panorama
 
-// What the surroundings show along a ray, finer than the field: the panorama, and emitters behind their occluders.
-Eigen::Vector4f fine_light(const LightField& field, const FieldSampler& sampler, const FieldRay& ray) {
+// An emitter behind its occluders, as a ray of the field sees it; nothing when the ray meets none, or one of which no
+// view told.
+std::optional<Eigen::Vector3f> emitter_light(const LightField& field, const FieldRay& ray) {
   const Rigid3& world_from_plane = field.plane.world_from_plane;
   const Eigen::Vector3f p = (world_from_plane * Eigen::Vector3d(static_cast<double>(ray.p_in_plane.x()),
                                                                 static_cast<double>(ray.p_in_plane.y()), 0))
                                 .cast<float>();
   const Eigen::Vector3f d = world_from_plane.rotation.cast<float>() * ray.direction;
-  for (const ShadedEmitter& e : field.emitters)
-    if (e.met_at(p, d)) {
-      const Eigen::Vector3f colour = e.visibility(p, d).value_or(1.0F) * e.radiance;
-      return {colour.x(), colour.y(), colour.z(), 1};
-    }
-  return field.surroundings.panorama_at(sampler.seen_from_centre(ray));
+  for (const ShadedEmitter& e : field.emitters) {
+    if (!e.met_at(p, d)) continue;
+    const auto visibility = e.visibility(p, d);
+    return visibility ? std::optional<Eigen::Vector3f>(*visibility * e.radiance) : std::nullopt;
+  }
+  return std::nullopt;
 }
 
-// The fine light averaged over each cell of the field as the point x sees it: colour and weight.
-std::vector<Eigen::Vector4f> panorama_cell_means(const LightField& field, const FieldSampler& sampler,
-                                                 const Eigen::Vector3d& x_in_world) {
-  const Rigid3& world_from_plane = field.plane.world_from_plane;
-  std::vector<Eigen::Vector4f> means(field.directions.size(), Eigen::Vector4f::Zero());
-  tbb::parallel_for(std::size_t{0}, means.size(), [&](std::size_t i) {
-    Eigen::Vector4f sum = Eigen::Vector4f::Zero();
-    float solid_angle = 0;
-    for (const CellSample& part : split_cell(field.directions, i, part_splits)) {
-      const auto ray = sampler.field_ray(x_in_world, world_from_plane.rotation * part.direction.cast<double>());
-      solid_angle += part.solid_angle_sr;
-      if (!ray) continue;
-      const Eigen::Vector4f seen = fine_light(field, sampler, *ray);
-      sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+// What is finer than the field, averaged over a cell as the point x sees it.
+struct CellMeans {
+  Eigen::Vector4f panorama = Eigen::Vector4f::Zero();  // colour and weight, of the parts that see no emitter
+  float on_emitters = 0;                               // share of the parts that do
+};
+
+CellMeans cell_means(const LightField& field, const FieldSampler& sampler, const Eigen::Vector3d& x_in_world,
+                     std::size_t cell) {
+  CellMeans means;
+  Eigen::Vector4f sum = Eigen::Vector4f::Zero();
+  float solid_angle = 0;
+  for (const CellSample& part : split_cell(field.directions, cell, part_splits)) {
+    const auto ray =
+        sampler.field_ray(x_in_world, field.plane.world_from_plane.rotation * part.direction.cast<double>());
+    solid_angle += part.solid_angle_sr;
+    if (!ray) continue;
+    if (emitter_light(field, *ray)) {
+      means.on_emitters += part.solid_angle_sr;
+      continue;
     }
-    if (sum.w() > 0) means[i] << sum.head<3>() / sum.w(), sum.w() / solid_angle;
-  });
+    const Eigen::Vector4f seen = field.surroundings.panorama_at(sampler.seen_from_centre(*ray));
+    sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+  }
+  if (solid_angle <= 0) return means;
+  means.on_emitters /= solid_angle;
+  if (sum.w() > 0) means.panorama << sum.head<3>() / sum.w(), sum.w() / solid_angle;
   return means;
 }
 
-// The field at one point, with the panorama's detail inside its cells.
+// The field at one point, with the detail inside its cells: emitters as they are, the rest as the panorama has it.
 class DetailedProbe {
  public:
   DetailedProbe(const LightField& field, const FieldSampler& sampler, const Eigen::Vector3d& x_in_world)
       : field_(field), sampler_(sampler), x_in_world_(x_in_world) {
     if (field.surroundings.panorama.empty()) return;
-    means_ = panorama_cell_means(field, sampler, x_in_world);
+    means_.resize(field.directions.size());
+    tbb::parallel_for(std::size_t{0}, means_.size(),
+                      [&](std::size_t i) { means_[i] = cell_means(field, sampler, x_in_world, i); });
   }
 
   [[nodiscard]] Eigen::Vector4f radiance(const Eigen::Vector3d& direction) const {
@@ -130,31 +142,39 @@ class DetailedProbe {
     if (!ray) return Eigen::Vector4f::Zero();
     Eigen::Vector4f seen = sampler_.radiance(*ray);
     if (means_.empty()) return seen;
-    seen.head<3>().array() *= detail(*ray, sampler_.locator().locate(ray->direction));
+    if (const auto light = emitter_light(field_, *ray))
+      seen.head<3>() = *light;
+    else
+      seen.head<3>() = beside_emitters(*ray, seen);
     return seen;
   }
 
  private:
-  // What the panorama has at the ray, relative to its cells' means: one factor a channel.
-  [[nodiscard]] Eigen::Array3f detail(const FieldRay& ray, const DirectionWeights& near) const {
+  // What the field has at the ray, with the panorama's detail: that relative to its cells' means, one factor a channel.
+  // In a cell that holds a part of an emitter the field is mostly the emitter's light: there the panorama alone speaks.
+  [[nodiscard]] Eigen::Vector3f beside_emitters(const FieldRay& ray, const Eigen::Vector4f& seen) const {
     Eigen::Vector4f smooth = Eigen::Vector4f::Zero();
+    float on_emitters = 0;
+    const DirectionWeights near = sampler_.locator().locate(ray.direction);
     for (std::size_t i = 0; i < near.index.size(); ++i) {
-      const Eigen::Vector4f& mean = means_[near.index[i]];
-      smooth += near.weight[i] * mean.w() * Eigen::Vector4f(mean.x(), mean.y(), mean.z(), 1);
+      const CellMeans& mean = means_[near.index[i]];
+      const Eigen::Vector4f& panorama = mean.panorama;
+      smooth += near.weight[i] * panorama.w() * Eigen::Vector4f(panorama.x(), panorama.y(), panorama.z(), 1);
+      on_emitters = std::max(on_emitters, mean.on_emitters);
     }
-    const Eigen::Vector4f fine = fine_light(field_, sampler_, ray);
+    const Eigen::Vector4f fine = field_.surroundings.panorama_at(sampler_.seen_from_centre(ray));
     constexpr float enough = 0.5F;  // weight below which the panorama says too little
-    if (smooth.w() < enough || fine.w() < enough) return Eigen::Array3f::Ones();
+    if (smooth.w() + on_emitters < enough || fine.w() < enough) return seen.head<3>();
+    if (on_emitters > 0) return fine.head<3>();
     constexpr float strongest = 32;  // a lamp of a pixel in a dark cell; more would be noise
-    const Eigen::Array3f below = (smooth.head<3>() / smooth.w()).array().max(1e-6F);
-    constexpr float weakest = 1e-3F;  // beside a lamp, in its cell
-    return (fine.head<3>().array() / below).min(strongest).max(weakest);
+    const Eigen::Array3f mean = (smooth.head<3>() / smooth.w()).array().max(1e-6F);
+    return seen.head<3>().array() * (fine.head<3>().array() / mean).min(strongest);
   }
 
   const LightField& field_;
   const FieldSampler& sampler_;
   Eigen::Vector3d x_in_world_;
-  std::vector<Eigen::Vector4f> means_;
+  std::vector<CellMeans> means_;
 };
 
 }  // namespace

@@ -13,22 +13,41 @@ std::optional<float> ShadedEmitter::met_at(const Eigen::Vector3f& origin, const 
   return along;
 }
 
-Eigen::Vector3f ShadedEmitter::occluder_point(const Eigen::Vector2f& m) const {
+Eigen::Vector3f ShadedEmitter::occluder_point(const Eigen::Vector2f& m, float share) const {
   const Eigen::Vector3f on_plane(m.x(), m.y(), plane_height_m);
-  return emitter.position + (1 - occluder_share) * (on_plane - emitter.position);
+  return emitter.position + (1 - share) * (on_plane - emitter.position);
+}
+
+Eigen::Vector2f ShadedEmitter::mask_texel(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
+                                          float share) const {
+  const float along = (emitter.position - p).dot(direction);
+  const Eigen::Vector3f from_emitter = p + share * along * direction - emitter.position;
+  const Eigen::Vector2f m =
+      (emitter.position + from_emitter * ((plane_height_m - emitter.position.z()) / from_emitter.z())).head<2>();
+  const Eigen::Vector2f size = mask_max_m - mask_min_m;
+  return {std::clamp((m.x() - mask_min_m.x()) / size.x() * static_cast<float>(mask.width), 0.5F,
+                     static_cast<float>(mask.width) - 0.5F),
+          std::clamp((mask_max_m.y() - m.y()) / size.y() * static_cast<float>(mask.height), 0.5F,
+                     static_cast<float>(mask.height) - 0.5F)};
+}
+
+// The share depends on where the ray passes, and that on the share: a fixed point, near at once since shares vary
+// slowly and rays to one small emitter lie close together.
+float ShadedEmitter::share_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
+  if (mask.empty()) return occluder_share;
+  float share = occluder_share;
+  constexpr int rounds = 3;
+  for (int i = 0; i < rounds; ++i) {
+    const Eigen::Vector2f at = mask_texel(p, direction, share);
+    share = mask.at(static_cast<int>(at.x()), static_cast<int>(at.y()), 2);
+  }
+  return share;
 }
 
 std::optional<float> ShadedEmitter::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
   if (mask.empty()) return std::nullopt;
-  const float along = (emitter.position - p).dot(direction);
-  const Eigen::Vector3f from_emitter = p + occluder_share * along * direction - emitter.position;
-  const Eigen::Vector2f m =
-      (emitter.position + from_emitter * ((plane_height_m - emitter.position.z()) / from_emitter.z())).head<2>();
-  const Eigen::Vector2f size = mask_max_m - mask_min_m;
-  const float x = std::clamp((m.x() - mask_min_m.x()) / size.x() * static_cast<float>(mask.width) - 0.5F, 0.0F,
-                             static_cast<float>(mask.width - 1));
-  const float y = std::clamp((mask_max_m.y() - m.y()) / size.y() * static_cast<float>(mask.height) - 0.5F, 0.0F,
-                             static_cast<float>(mask.height - 1));
+  const Eigen::Vector2f at = mask_texel(p, direction, share_along(p, direction)).array() - 0.5F;
+  const float x = at.x(), y = at.y();
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
   const int x1 = std::min(x0 + 1, mask.width - 1), y1 = std::min(y0 + 1, mask.height - 1);
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);

@@ -17,19 +17,20 @@ struct Emitter {
 
 // An emitter, and what hides parts of it from parts of the plane: leaves, a lampshade, a hand-rail.
 //
-// What hides it is taken to lie at one distance: at `occluder_share` of the way from the plane to the emitter. A ray
-// from p to a point y of the emitter passes the occluder at q = p + share · (y − p). `mask` holds how much light passes
-// there; it is laid out on the plane, q standing where the emitter's centre casts its shadow: m = e + (q − e) (h −
-// e_z)/(q_z − e_z).
+// What hides it lies at `share` of the way from the plane to the emitter, a share of its own for each line from the
+// emitter's centre to a point m of the plane. A ray from p to a point y of the emitter passes the occluder at
+// q = p + share · (y − p), which is on the line to m = e + (q − e) (h − e_z)/(q_z − e_z): there the mask says how much
+// light passes.
 struct ShadedEmitter {
   Emitter emitter;
   Eigen::Vector3f radiance = Eigen::Vector3f::Zero();  // where nothing hides it
-  float occluder_share = 1;                            // 0 to 1
+  float occluder_share = 1;                            // 0 to 1: the share where the mask knows none
   float plane_height_m = 0;                            // h: world z of the plane
   Eigen::Vector2f mask_min_m = Eigen::Vector2f::Zero();
   Eigen::Vector2f mask_max_m = Eigen::Vector2f::Zero();
-  ImageF mask;  // two channels: the share of light that passes (0…1), and its weight (0: no view looked there); row 0
-                // at max y
+  // Three channels: the part of the light that passes (0…1), its weight (0: no view looked there), the share. Row 0 at
+  // max y.
+  ImageF mask;
 
   // Distance from the origin to the ray's point nearest to the centre; nothing when it passes outside `scale` radii.
   [[nodiscard]] std::optional<float> met_at(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
@@ -39,8 +40,16 @@ struct ShadedEmitter {
   // Precondition: the ray meets the emitter.
   [[nodiscard]] std::optional<float> visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
 
-  // The occluder's point that stands at mask position m (world x, y).
-  [[nodiscard]] Eigen::Vector3f occluder_point(const Eigen::Vector2f& m) const;
+  // The share for the ray from the plane's point p (world) to the emitter; precondition as above.
+  [[nodiscard]] float share_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
+
+  // The occluder's point on the line to mask position m (world x, y).
+  [[nodiscard]] Eigen::Vector3f occluder_point(const Eigen::Vector2f& m, float share) const;
+
+ private:
+  // Where the ray passes an occluder at `share`, as a position in texels of the mask (centres at +0.5), inside it.
+  [[nodiscard]] Eigen::Vector2f mask_texel(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
+                                           float share) const;
 };
 
 }  // namespace mf

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "host/blending/view_weights.h"
 #include "host/light_field/view_rays.h"
@@ -265,55 +264,6 @@ Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneR
   s.inverse_distance = median_of_nine(s.inverse_distance);
   for (const Emitter& emitter : emitters) set_distance(s, emitter);
   return s;
-}
-
-ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& surroundings,
-                     const EmitterBlender& emitters, int width) {
-  constexpr float emitter_angle_rad = 0.012F;  // beside an emitter, noise would be multiplied by its light
-  constexpr int k = 4;                         // few: every further view blurs what the distance gets wrong
-  const int height = width / 4;
-  const float texel_rad = 2 * std::numbers::pi_v<float> / static_cast<float>(width);
-  ImageF panorama(width, height, 4);
-  std::vector<std::uint32_t> all_views(views.size());
-  std::iota(all_views.begin(), all_views.end(), 0U);
-  tbb::parallel_for(0, height, [&](int y) {
-    std::vector<ViewPenalty> ranked;
-    std::array<ViewWeight, k> weights;
-    const float zenith = (static_cast<float>(y) + 0.5F) / static_cast<float>(height) * 0.5F * std::numbers::pi_v<float>;
-    for (int x = 0; x < width; ++x) {
-      const float azimuth = (static_cast<float>(x) + 0.5F) * texel_rad;
-      const Eigen::Vector3f d(std::sin(zenith) * std::cos(azimuth), std::sin(zenith) * std::sin(azimuth),
-                              std::cos(zenith));
-      const ProxyPoint point = proxy_point(surroundings.centre_in_world, d, surroundings.inverse_distance_of(d));
-      const auto look = [&](const FieldView& view) -> Eigen::Vector4f {
-        const Eigen::Vector3f pixel = pixel_of(view, point);
-        if (pixel.z() <= 0) return Eigen::Vector4f::Zero();
-        return view.fetch(level_for_angle(view, point, texel_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-      };
-      ranked.clear();
-      for (std::uint32_t v = 0; v < views.size(); ++v) {
-        const float weight = look(views[v]).w();
-        if (weight > 0.02F)
-          ranked.push_back({v, ray_distance(surroundings.centre_in_world, point, views[v].centre_in_world) / weight});
-      }
-      if (emitters.concerns(surroundings.centre_in_world, d, texel_rad)) {
-        // Unhidden: what stands before an emitter looks different from every point, and the field itself knows it.
-        const auto unhidden = emitters.unhidden(surroundings.centre_in_world, d);
-        Eigen::Vector4f seen = emitters.radiance(surroundings.centre_in_world, d, emitter_angle_rad, all_views);
-        if (unhidden) seen << *unhidden, 1;
-        for (int c = 0; c < 4; ++c) panorama.at(x, y, c) = seen[c];
-        continue;
-      }
-      const std::size_t speaking = blend_weights(ranked, k, 1e-3F, weights);
-      Eigen::Vector4f sum = Eigen::Vector4f::Zero();
-      for (std::size_t i = 0; i < speaking; ++i) {
-        const Eigen::Vector4f seen = look(views[weights[i].view]);
-        sum += weights[i].weight / seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), seen.w());
-      }
-      for (int c = 0; c < 4; ++c) panorama.at(x, y, c) = sum[c];
-    }
-  });
-  return panorama;
 }
 
 }  // namespace mf

@@ -30,11 +30,6 @@ struct SphereScore {
 [[nodiscard]] Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle&,
                                              std::span<const Emitter>);
 
-// The surroundings' panorama as the rectangle's centre sees it, blended from the views that pass nearest to it.
-// `width` × `width`/4 pixels.
-[[nodiscard]] ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings&, const EmitterBlender&,
-                                   int width);
-
 // World position of the rectangle's centre.
 [[nodiscard]] Eigen::Vector3f centre_of(const PlaneRectangle&);
 
