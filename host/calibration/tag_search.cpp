@@ -260,7 +260,8 @@ void TagSearch::complete(const ImageF& picture, PixelLayout layout, std::vector<
   for (bool again = true; again;) {
     again = false;
     for (const auto& [id, corners] : target_.corners_in_target) {
-      if (std::any_of(found.begin(), found.end(), [known = id](const TagSighting& t) { return t.id == known; })) continue;
+      if (std::any_of(found.begin(), found.end(), [known = id](const TagSighting& t) { return t.id == known; }))
+        continue;
       if (tried_with[id] == found.size()) continue;
       tried_with[id] = found.size();
       const std::optional<TagCorners> start = predict(found, corners);

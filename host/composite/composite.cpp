@@ -18,8 +18,9 @@ Eigen::Vector4f texel_of_plate(const ImageF& plate, const View& view, const Rigi
       (ground.max_m - ground.min_m).cwiseQuotient(Eigen::Vector2f(ground.width, ground.height));
   Eigen::Vector4f sum = Eigen::Vector4f::Zero();
   for (int i = 0; i < points * points; ++i) {
-    const Eigen::Vector2f offset((static_cast<float>(i % points) + 0.5F) / points - 0.5F,
-                                 (static_cast<float>(i / points) + 0.5F) / points - 0.5F);
+    const int across = i % points, down = i / points;
+    const Eigen::Vector2f offset((static_cast<float>(across) + 0.5F) / points - 0.5F,
+                                 (static_cast<float>(down) + 0.5F) / points - 0.5F);
     const Eigen::Vector2f p = ground.position(column, row) + texel.cwiseProduct(offset);
     const Eigen::Vector3d in_cam = cam_from_plane * Eigen::Vector3d(p.x(), p.y(), 0);
     if (in_cam.z() <= 0) continue;

@@ -142,7 +142,7 @@ std::vector<const Spot*> voters(const std::vector<Spot>& spots, const Eigen::Vec
 
 std::optional<Eigen::Vector3f> propose(const Spot& a, const Spot& b, const EmitterOptions& options) {
   if (a.direction.cross(b.direction).norm() < least_parallax_rad) return std::nullopt;
-  const auto x = nearest_point({&a, &b}, a.origin + a.direction);
+  auto x = nearest_point({&a, &b}, a.origin + a.direction);
   if (!x || (*x - a.origin).norm() > options.farthest_m) return std::nullopt;
   if (!agrees(a, *x, options.tolerance_rad) || !agrees(b, *x, options.tolerance_rad)) return std::nullopt;
   return x;
@@ -150,6 +150,7 @@ std::optional<Eigen::Vector3f> propose(const Spot& a, const Spot& b, const Emitt
 
 float typical_radius(const std::vector<const Spot*>& rays, const Eigen::Vector3f& x) {
   std::vector<float> radii;
+  radii.reserve(rays.size());
   for (const Spot* ray : rays) radii.push_back(ray->radius_rad * (x - ray->origin).norm());
   // The median: occluders make some spots smaller, blur makes others larger.
   const auto upper = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);

@@ -144,7 +144,7 @@ LightField field_without_texels(const Imf::Header& header, const std::string& fi
   field.plane.min_m = {low.x, low.y};
   field.plane.max_m = {high.x, high.y};
   field.directions = directions_of(header, file);
-  const Imath::Box2i window = header.dataWindow();
+  const Imath::Box2i& window = header.dataWindow();
   if (field.resolution < 2 || field.resolution > 1024 || !header.hasTileDescription() ||
       header.tileDescription().xSize != static_cast<unsigned>(field.resolution) ||
       window.max.x - window.min.x + 1 != atlas_columns(field.directions.size()) * field.resolution ||

@@ -108,7 +108,9 @@ std::size_t usual_share(const std::vector<ImageF>& sweep) {
       variance += disagreement.data[i];
       known += disagreement.data[i + 1];
     }
-    return variance / known;
+    // Without any occluder nothing differs at any distance: then where most is known.
+    constexpr float unknown = 0.005F;
+    return variance / known + unknown * (1 - known / static_cast<float>(sweep_side * sweep_side));
   };
   return static_cast<std::size_t>(
       std::min_element(sweep.begin(), sweep.end(),

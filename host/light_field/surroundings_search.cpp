@@ -100,6 +100,7 @@ std::vector<SphereScore> score_spheres(const std::vector<FieldView>& views, cons
     if (radius > smallest) scores.push_back({radius, 0});
   const std::vector<TestRay> rays = test_rays(rectangle);
   std::vector<Surroundings> spheres;
+  spheres.reserve(scores.size());
   for (const SphereScore& s : scores) spheres.push_back(sphere_surroundings(centre_of(rectangle), s.radius_m));
   std::vector<std::vector<double>> spread(rays.size());
   tbb::parallel_for(std::size_t{0}, rays.size(), [&](std::size_t r) {

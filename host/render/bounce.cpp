@@ -51,10 +51,12 @@ std::vector<Eigen::Vector3f> vertex_irradiance(const TriangleMesh& mesh, const R
   std::vector<std::uint32_t> order(mesh.positions.size());
   std::iota(order.begin(), order.end(), 0U);
   std::vector<std::uint32_t> code;
+  code.reserve(mesh.positions.size());
   for (const Eigen::Vector3f& p : mesh.positions) code.push_back(morton_code(p, scene.bounds()));
   std::sort(order.begin(), order.end(), [&](auto a, auto b) { return code[a] < code[b]; });
   const std::vector<SurfacePoint> points = vertex_points(mesh);
   std::vector<SurfacePoint> sorted;
+  sorted.reserve(order.size());
   for (const std::uint32_t i : order) sorted.push_back(points[i]);
   const std::vector<Eigen::Vector3f> by_order = irradiance_cpu(scene, sorted, set, LightSum::visible);
   std::vector<Eigen::Vector3f> result(by_order.size());

@@ -59,8 +59,9 @@ class PixelCaster {
     RTCRayHit16 rays;
     std::array<Eigen::Vector3f, samples> directions;
     for (std::size_t i = 0; i < samples; ++i) {
-      const double sx = (static_cast<double>(i % 4) + 0.5) / 4;
-      const double sy = (static_cast<double>(i / 4) + 0.5) / 4;
+      const std::size_t column = i % 4, row = i / 4;
+      const double sx = (static_cast<double>(column) + 0.5) / 4;
+      const double sy = (static_cast<double>(row) + 0.5) / 4;
       const auto ray = camera_->unproject({px + sx, py + sy});
       active[i] = ray ? -1 : 0;
       directions[i] = (rotation_ * ray.value_or(Eigen::Vector3d::UnitZ())).cast<float>();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/render/ray_scene.h"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -29,7 +30,7 @@ RayScene::RayScene(const TriangleMesh& mesh)
     void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                             sizeof(mesh.triangles[0]), mesh.triangles.size());
     check(vertices != nullptr && indices != nullptr, "Embree holds the mesh");
-    std::memcpy(vertices, mesh.positions.data(), mesh.positions.size() * sizeof(Eigen::Vector3f));
+    std::copy(mesh.positions.begin(), mesh.positions.end(), static_cast<Eigen::Vector3f*>(vertices));
     std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene_, geometry);
@@ -43,7 +44,7 @@ RayScene::RayScene(const TriangleMesh& mesh)
 RayScene::RayScene(RayScene&& other) noexcept
     : device_(std::exchange(other.device_, nullptr)),
       scene_(std::exchange(other.scene_, nullptr)),
-      bounds_(other.bounds_),
+      bounds_(std::move(other.bounds_)),  // NOLINT(performance-move-const-arg): the other check asks for it
       surface_offset_m_(other.surface_offset_m_) {}
 
 RayScene::~RayScene() {

@@ -72,7 +72,8 @@ TEST(BinCells, EachCellBecomesItsOwnColours) {
   for (const PixelLayout layout : orders) {
     const ImageF rgb = bin_cells(mosaic_of(9, 8, layout,
                                            [](int x, int y) {
-                                             return std::array<double, 3>{1.0 + x / 2, 10.0 + y / 2, 100};
+                                             const int column = x / 2, row = y / 2;
+                                             return std::array<double, 3>{1.0 + column, 10.0 + row, 100};
                                            }),
                                  layout);
     ASSERT_EQ(rgb.width, 4);

@@ -137,7 +137,7 @@ TEST(ResponseJson, RoundTrip) {
 }
 
 // Each fault is one line that names the file and the field.
-void expect_refused(nlohmann::json json, const std::string& field) {
+void expect_refused(const nlohmann::json& json, const std::string& field) {
   try {
     (void)response_curve_from_json(json, "response.json");
     ADD_FAILURE() << "accepted a bad " << field;

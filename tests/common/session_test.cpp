@@ -148,6 +148,7 @@ TEST(Session, ManyThreadsReadAtOnce) {
   write_session(folder / "s", {}, 8);
   const SessionReader reader(folder / "s");
   std::vector<std::thread> threads;
+  threads.reserve(4);
   std::atomic<int> right = 0;
   for (int t = 0; t < 4; ++t)
     threads.emplace_back([&] {

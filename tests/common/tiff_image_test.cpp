@@ -104,7 +104,8 @@ std::string foreign_tiff(const std::filesystem::path& file, const Foreign& kind)
   }
   const bool separate = kind.planar == PLANARCONFIG_SEPARATE;
   const int samples = separate ? 1 : kind.samples;
-  for (std::uint16_t plane = 0; plane < (separate ? kind.samples : 1); ++plane)
+  const auto planes = static_cast<std::uint16_t>(separate ? kind.samples : 1);
+  for (std::uint16_t plane = 0; plane < planes; ++plane)
     for (std::uint32_t y0 = 0; y0 < foreign_height; y0 += block)
       for (std::uint32_t x0 = 0; x0 < foreign_width; x0 += block_width) {
         const std::uint32_t rows = kind.tiled ? block : std::min<std::uint32_t>(block, foreign_height - y0);

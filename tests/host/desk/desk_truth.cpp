@@ -117,7 +117,8 @@ std::vector<Eigen::Vector3d> points_on_white() {
   constexpr int side = 64;
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < side * side; ++i) {
-    const double u = 2 * board_half_m * (i % side + 0.5) / side, v = 2 * board_half_m * (i / side + 0.5) / side;
+    const int x = i % side, y = i / side;
+    const double u = 2 * board_half_m * (x + 0.5) / side, v = 2 * board_half_m * (y + 0.5) / side;
     const double column = u / square_m, row = v / square_m;
     const bool white = (static_cast<int>(column) + static_cast<int>(row)) % 2 == 1;
     constexpr double inner = 0.38;

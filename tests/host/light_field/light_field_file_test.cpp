@@ -27,7 +27,7 @@ LightField example() {
   field.surroundings = sphere_surroundings({0.1F, 0.2F, 0.25F}, 2);
   field.surroundings.panorama = ImageF(8, 2, 4, 0.75F);
   field.emitters.push_back(
-      {{{0.5F, 0.3F, 0.9F}, 0.05F, 12}, {3, 2, 1}, 0.4F, 0.25F, {-0.4F, -0.3F}, {0.5F, 0.6F}, ImageF(4, 4, 2, 0.5F)});
+      {{{0.5F, 0.3F, 0.9F}, 0.05F, 12}, {3, 2, 1}, 0.4F, 0.25F, {-0.4F, -0.3F}, {0.5F, 0.6F}, ImageF(4, 4, 3, 0.5F)});
   field.resolution = 5;
   field.options_json = R"({"k":6})";
   field.rgbc.resize(field.directions.size() * 25);

@@ -83,7 +83,7 @@ TEST(Resample, SmallLampKeepsItsEnergy) {
         ours += irradiance_at(r.field, {x, y}) - sky_part;
         truth += globe.irradiance({x, y, 0});
       }
-    EXPECT_NEAR(ours / truth, 1, 0.1) << directions;
+    EXPECT_NEAR(ours / truth, 1, 0.06) << directions;
   }
 }
 

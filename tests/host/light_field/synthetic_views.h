@@ -33,7 +33,8 @@ inline FieldView analytic_view(const Eigen::Vector3f& centre, const Eigen::Vecto
       constexpr int n = 4;  // a pixel integrates: n × n rays
       Eigen::Vector3f colour = Eigen::Vector3f::Zero();
       for (int i = 0; i < n * n; ++i) {
-        const float du = (static_cast<float>(i % n) + 0.5F) / n, dv = (static_cast<float>(i / n) + 0.5F) / n;
+        const int column = i % n, row = i / n;
+        const float du = (static_cast<float>(column) + 0.5F) / n, dv = (static_cast<float>(row) + 0.5F) / n;
         const Eigen::Vector3f ray((static_cast<float>(u) + du - middle) / focal,
                                   (static_cast<float>(v) + dv - middle) / focal, 1);
         colour += light(centre, (view_from_world.transpose() * ray).normalized()) / (n * n);
