@@ -29,7 +29,7 @@ struct CaptureOptions {
 // Camera poses of the truth pictures; the first is the rig's own camera.
 [[nodiscard]] Rigid3 desk_cam_from_world(int view);
 
-// Simulates a whole recording of desk_scene() and writes it in the import format (docs/session.md): frames.json,
+// Simulates a whole recording of desk_scene() and writes it in the import format (docs/import.md): frames.json,
 // frames/, camera.json, target.json, world.json, scene.png, sweep.json, sweep/, reference.json, and beside it truth/:
 // calibration.json, response.json, views.json, plateN.exr, knot.obj, knotN.exr, probe_0_0_0.1.exr. Same options, same
 // bytes. The folder appears whole or not at all. Throws InputError when it exists or cannot be written.

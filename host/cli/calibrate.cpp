@@ -13,6 +13,7 @@
 #include "host/calibration/colmap_export.h"
 #include "host/calibration/session_targets.h"
 #include "host/cli/command.h"
+#include "host/cli/session_files.h"
 
 namespace mf {
 
@@ -27,16 +28,6 @@ struct Arguments {
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-// Linear-float frames need no response: they are proportional to light already.
-ResponseCurve response_of(const SessionReader& session) {
-  const std::filesystem::path file = session.folder() / "response.json";
-  if (std::filesystem::exists(file)) return read_response_curve(file);
-  if (session.header().format.linear_float) return {};
-  throw InputError(file.string(), "",
-                   fmt::format("is missing: run `mirrorfield photometry {}` first, tags are found in linearized frames",
-                               session.folder().string()));
 }
 
 nlohmann::json summary_of(const CalibrationResult& result) {

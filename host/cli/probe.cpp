@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "common/error.h"
 #include "host/cli/command.h"
@@ -39,7 +37,7 @@ ProbeFigures measure(const Probe& probe, LatLongConvention convention) {
     for (int x = 0; x < w; ++x) {
       const Eigen::Vector3d d = lat_long_direction(convention, w, h, x, y);
       if (d.z() <= 0) continue;
-      const double solid_angle = 2 * std::numbers::pi / w * std::numbers::pi / h * std::hypot(d.x(), d.y());
+      const double solid_angle = lat_long_solid_angle(convention, w, h, x, y);
       for (int c = 0; c < 3; ++c)
         figures.irradiance[static_cast<std::size_t>(c)] +=
             static_cast<double>(probe.radiance.at(x, y, c)) * d.z() * solid_angle;

@@ -10,6 +10,7 @@
 #include "common/session.h"
 #include "host/cli/command.h"
 #include "host/cli/run_resample.h"
+#include "host/cli/session_files.h"
 
 namespace mf {
 
@@ -66,8 +67,8 @@ ResampleResult run_resample(const std::filesystem::path& folder, const std::file
                      problem->substr(problem->find(':') + 2));
   auto start = std::chrono::steady_clock::now();
   const SessionReader session(folder);
-  const ResponseCurve response = read_response_curve(folder / "response.json");
-  const Calibration calibration = read_calibration(folder / "calibration.json");
+  const ResponseCurve response = response_of(session);
+  const Calibration calibration = calibration_of(session);
   std::optional<PlaneRectangle> rectangle;
   if (options.rectangle) {
     const auto& r = *options.rectangle;

@@ -77,6 +77,14 @@ Eigen::Vector3d lat_long_direction(LatLongConvention convention, int width, int 
   return {y_up.x(), -y_up.z(), y_up.y()};
 }
 
+double lat_long_solid_angle(LatLongConvention convention, int width, int height, int x, int y) {
+  using std::numbers::pi;
+  const double across = lat_long_direction(convention, width, height, x, y).head<2>().norm();
+  if (convention != LatLongConvention::openexr) return 2 * pi / width * pi / height * across;
+  const double share = x == 0 || x == width - 1 ? 0.5 : 1;  // the first and the last column are the same directions
+  return share * 2 * pi / (width - 1) * pi / (height - 1) * across;
+}
+
 namespace {
 
 constexpr int part_splits = 3;  // 48 parts a cell: at 2500 directions each is about a pixel of the panorama

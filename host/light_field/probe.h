@@ -54,6 +54,9 @@ enum class LatLongConvention {
 // World direction of a lat-long picture's pixel (centre), unit length.
 [[nodiscard]] Eigen::Vector3d lat_long_direction(LatLongConvention, int width, int height, int x, int y);
 
+// The solid angle that the pixel stands for, steradians.
+[[nodiscard]] double lat_long_solid_angle(LatLongConvention, int width, int height, int x, int y);
+
 struct Probe {
   ImageF radiance;    // RGB, width × width/2
   ImageF confidence;  // one channel, 0…1
