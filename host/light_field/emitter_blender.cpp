@@ -34,8 +34,8 @@ void ask_about_emitter(const std::vector<FieldView>& views, std::span<const std:
   const ProxyPoint x = proxy_point(p, direction, 1 / (e.share_along(p, direction) * along));
   for (const std::uint32_t v : candidates) {
     const FieldView& view = views[v];
-    constexpr float well_inside = 0.7F;  // of the radius: pixels at the rim show half of what is beside the emitter
-    if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), well_inside)) continue;
+    if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ShadedEmitter::well_inside))
+      continue;
     const Eigen::Vector3f pixel = pixel_of(view, x);
     if (pixel.z() <= 0) continue;
     const Eigen::Vector4f seen =

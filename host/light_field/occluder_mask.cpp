@@ -21,7 +21,6 @@ constexpr float share_step = 0.025F;
 constexpr std::size_t shares = 30;     // up to 0.875
 constexpr float prior = 0.01F;         // variance that a distance must gain to be chosen a whole way off the usual one
 constexpr float margin_m = 0.06F;      // rays to the emitter's rim pass the occluder beside its centre's shadow
-constexpr float well_inside = 0.7F;    // of the radius: pixels at the rim show half of what is beside the emitter
 constexpr float most = 1.5F;           // noise goes both ways: it must average out
 constexpr float least_weight = 0.02F;  // a view that shows less of a point does not speak for it
 
@@ -48,7 +47,8 @@ Votes ask(const std::vector<FieldView>& views, const ShadedEmitter& e, const Eig
   const float full = std::max(e.radiance.sum(), 1e-6F);
   const ProxyPoint x = q.homogeneous();
   for (const FieldView& view : views) {
-    if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), well_inside)) continue;
+    if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ShadedEmitter::well_inside))
+      continue;
     const Eigen::Vector3f pixel = pixel_of(view, x);
     if (pixel.z() <= 0) continue;
     const Eigen::Vector4f seen =

@@ -71,18 +71,18 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
         if (pixel.z() <= 0) return Eigen::Vector4f::Zero();
         return view.fetch(level_for_angle(view, point, texel_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
       };
-      ranked.clear();
-      for (std::uint32_t v = 0; v < views.size(); ++v) {
-        const float weight = look(views[v]).w();
-        if (weight > 0.02F)
-          ranked.push_back({v, ray_distance(surroundings.centre_in_world, point, views[v].centre_in_world) / weight});
-      }
       if (emitters.concerns(surroundings.centre_in_world, d, texel_rad)) {
         // An emitter, and what stands before it, looks different from every point: the field keeps it by itself.
         if (emitters.unhidden(surroundings.centre_in_world, d)) continue;
         const Eigen::Vector4f seen = emitters.radiance(surroundings.centre_in_world, d, texel_rad, all_views);
         for (int c = 0; c < 4; ++c) panorama.at(x, y, c) = seen[c];
         continue;
+      }
+      ranked.clear();
+      for (std::uint32_t v = 0; v < views.size(); ++v) {
+        const float weight = look(views[v]).w();
+        if (weight > 0.02F)
+          ranked.push_back({v, ray_distance(surroundings.centre_in_world, point, views[v].centre_in_world) / weight});
       }
       const std::size_t speaking = blend_weights(ranked, k, 1e-3F, weights);
       Eigen::Vector4f sum = Eigen::Vector4f::Zero();

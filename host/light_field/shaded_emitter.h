@@ -22,6 +22,10 @@ struct Emitter {
 // q = p + share · (y − p), which is on the line to m = e + (q − e) (h − e_z)/(q_z − e_z): there the mask says how much
 // light passes.
 struct ShadedEmitter {
+  // Of the radius: a view's ray that passes the centre no farther off sees nothing but the emitter. Pixels at the rim
+  // show half of what is beside it.
+  static constexpr float well_inside = 0.7F;
+
   Emitter emitter;
   Eigen::Vector3f radiance = Eigen::Vector3f::Zero();  // where nothing hides it
   float occluder_share = 1;                            // 0 to 1: the share where the mask knows none
