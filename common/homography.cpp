@@ -3,10 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
 
 #include "common/check.h"
+#include "common/dense.h"
 
 namespace mf {
 
@@ -45,10 +45,10 @@ std::optional<Homography> fit_homography(std::span<const Eigen::Vector2d> source
     a.row(r) << x, Eigen::RowVector3d::Zero(), -y.x() * x;
     a.row(r + 1) << Eigen::RowVector3d::Zero(), x, -y.y() * x;
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeFullV);
+  const NullVector null = null_vector(a);
   constexpr double rank_tolerance = 1e-9;  // relative; a second null vector means that the points leave H open
-  if (svd.singularValues()(7) < rank_tolerance * svd.singularValues()(0)) return std::nullopt;
-  const Eigen::VectorXd h = svd.matrixV().col(8);
+  if (null.singular_values(7) < rank_tolerance * null.singular_values(0)) return std::nullopt;
+  const Eigen::VectorXd& h = null.vector;
   const Eigen::Matrix3d normalized =
       (Eigen::Matrix3d() << h(0), h(1), h(2), h(3), h(4), h(5), h(6), h(7), h(8)).finished();
   const Eigen::Matrix3d matrix = normalize_target.inverse() * normalized * normalize_source;

@@ -7,8 +7,6 @@ namespace mf::sim {
 
 namespace {
 
-const Rgb paper{0.75F, 0.75F, 0.72F};
-const Rgb ink{0.04F, 0.04F, 0.04F};
 const Rgb back{0.1F, 0.1F, 0.1F};
 constexpr double margin_m = 0.004;  // paper beyond the outermost tags' own white margin
 

@@ -14,8 +14,6 @@ namespace {
 
 using Eigen::Vector3f;
 
-const Rgb paper{0.75F, 0.75F, 0.72F};
-const Rgb ink{0.04F, 0.04F, 0.04F};
 const Rgb dark_square{0.08F, 0.08F, 0.09F};
 constexpr double tag_size_m = 0.08;
 

@@ -14,6 +14,10 @@ namespace mf::sim {
 
 using Rgb = Eigen::Array3f;  // linear BT.709: radiance, or a reflectance in [0, 1]
 
+// What every print of the scene is made of: the table's tags and the mirror's frame.
+inline const Rgb paper{0.75F, 0.75F, 0.72F};
+inline const Rgb ink{0.04F, 0.04F, 0.04F};
+
 // Triangles in the world frame, metres. Both sides are seen.
 struct Mesh {
   std::vector<Eigen::Vector3f> vertices;

@@ -3,8 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,6 +11,7 @@
 #include <thread>
 
 #include "common/check.h"
+#include "common/dense.h"
 #include "common/error.h"
 #include "host/calibration/bundle_adjustment.h"
 #include "host/calibration/robust_homography.h"
@@ -62,11 +62,13 @@ Pixels reprojection(const CameraModel& camera, const Rigid3& pose, const TargetV
 void add_model_error(TargetView& view, double sigma_px) {
   std::vector<TagSighting> kept;
   for (TagSighting tag : view.tags) {
-    const Eigen::LDLT<Matrix8> ldlt(tag.information);
-    if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 0)) continue;
-    const Matrix8 covariance = ldlt.solve(Matrix8::Identity()) + sigma_px * sigma_px * Matrix8::Identity();
-    tag.information = covariance.inverse();
-    if (tag.information.allFinite()) kept.push_back(tag);
+    std::optional<Eigen::MatrixXd> covariance = inverse_of_positive(tag.information);
+    if (!covariance) continue;
+    covariance->diagonal().array() += sigma_px * sigma_px;
+    const std::optional<Eigen::MatrixXd> information = inverse_of_positive(*covariance);
+    if (!information) continue;
+    tag.information = *information;
+    kept.push_back(tag);
   }
   view.tags = std::move(kept);
 }
@@ -244,7 +246,8 @@ bool Calibrator::drop_unseen_distortion() {
     for (std::size_t i = 0; i < group.size(); ++i)
       value[static_cast<Eigen::Index>(i)] = adjustment_.camera.parameters[static_cast<std::size_t>(group[i])];
     const Eigen::MatrixXd covariance = adjustment_.camera_covariance(group, group);
-    if (value.dot(covariance.ldlt().solve(value)) > significant) {
+    const std::optional<Eigen::MatrixXd> solved = solve_symmetric(covariance, value);
+    if (!solved || value.dot(solved->col(0)) > significant) {
       if (group[0] == 8) return false;  // k3 is real: so are the radial terms below it; tangential ones stay too
       continue;
     }
@@ -371,6 +374,13 @@ std::string distortion_choice_name(DistortionChoice choice) {
   }
   check(false, "every distortion choice has a name");
   return {};
+}
+
+std::optional<DistortionChoice> parse_distortion_choice(std::string_view name) {
+  for (const DistortionChoice choice : {DistortionChoice::automatic, DistortionChoice::none, DistortionChoice::radial,
+                                        DistortionChoice::brown, DistortionChoice::full})
+    if (name == distortion_choice_name(choice)) return choice;
+  return std::nullopt;
 }
 
 std::optional<std::string> CalibrationOptions::validate() const {

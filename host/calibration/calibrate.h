@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/progress.h"
@@ -19,6 +20,7 @@ enum class DistortionChoice {
   full,    // k1 k2 p1 p2 k3
 };
 [[nodiscard]] std::string distortion_choice_name(DistortionChoice);
+[[nodiscard]] std::optional<DistortionChoice> parse_distortion_choice(std::string_view name);
 
 struct CalibrationOptions {
   DistortionChoice distortion = DistortionChoice::automatic;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/calibration/tag_refinement.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "common/check.h"
+#include "common/dense.h"
 #include "common/homography.h"
 #include "host/calibration/blurred_pattern.h"
 
@@ -25,6 +25,7 @@ constexpr int per_pixel = 13;  // what one pixel depends on: all but the other t
 using PixelMatrix = Eigen::Matrix<double, per_pixel, per_pixel>;
 using PixelVector = Eigen::Matrix<double, per_pixel, 1>;
 using FullMatrix = Eigen::Matrix<double, parameter_count, parameter_count>;
+using Matrix8 = Eigen::Matrix<double, 8, 8>;
 using FullVector = Eigen::Matrix<double, parameter_count, 1>;
 
 struct Light {
@@ -253,9 +254,9 @@ std::optional<double> Alignment::step(bool free_blur) {
     normal(blur_at, blur_at) = 1;
     gradient[blur_at] = 0;
   }
-  const Eigen::LDLT<FullMatrix> solver(normal);
-  const FullVector d = solver.solve(gradient);
-  if (solver.info() != Eigen::Success || !d.allFinite()) return std::nullopt;
+  const std::optional<Eigen::MatrixXd> solution = solve_symmetric(normal, gradient);
+  if (!solution) return std::nullopt;
+  const FullVector d = *solution;
   const TagCorners before = corners(state_.picture_from_tag);
   Eigen::Matrix3d& h = state_.picture_from_tag;
   h.row(0) += d.segment<3>(0).transpose();
@@ -287,10 +288,11 @@ std::optional<RefinedTag> Alignment::result() {
   // Marginalize light and blur, then change from h to the corners.
   constexpr int rest = parameter_count - geometry_count;
   const Eigen::Matrix<double, geometry_count, rest> cross = normal.topRightCorner<geometry_count, rest>();
-  const Eigen::Matrix<double, geometry_count, geometry_count> of_h =
-      normal.topLeftCorner<geometry_count, geometry_count>() -
-      cross * normal.bottomRightCorner<rest, rest>().ldlt().solve(cross.transpose());
-  Eigen::Matrix<double, 8, 8> corners_per_h = Eigen::Matrix<double, 8, 8>::Zero();
+  const Eigen::Matrix<double, rest, geometry_count> crossed = cross.transpose();
+  const std::optional<Eigen::MatrixXd> follow = solve_symmetric(normal.bottomRightCorner<rest, rest>(), crossed);
+  if (!follow) return std::nullopt;
+  const Matrix8 of_h = normal.topLeftCorner<geometry_count, geometry_count>() - cross.lazyProduct(*follow);
+  Matrix8 corners_per_h = Matrix8::Zero();
   for (int k = 0; k < 4; ++k) {
     const Eigen::Vector3d q = tag_corners()[static_cast<std::size_t>(k)].homogeneous();
     const double w = state_.picture_from_tag.row(2).dot(q);
@@ -299,10 +301,11 @@ std::optional<RefinedTag> Alignment::result() {
     corners_per_h.block<1, 3>(2 * k + 1, 3) = q.transpose() / w;
     corners_per_h.block<2, 2>(2 * k, 6) = -x * q.head<2>().transpose() / w;
   }
-  const Eigen::FullPivLU<Eigen::Matrix<double, 8, 8>> lu(corners_per_h);
-  if (!lu.isInvertible()) return std::nullopt;
-  const Eigen::Matrix<double, 8, 8> h_per_corners = lu.inverse();
-  tag.information = h_per_corners.transpose() * of_h * h_per_corners;
+  const std::optional<Eigen::MatrixXd> inverse = inverse_of(corners_per_h);
+  if (!inverse) return std::nullopt;
+  const Matrix8 h_per_corners = *inverse;
+  const Matrix8 of_corners = of_h.lazyProduct(h_per_corners);
+  tag.information = h_per_corners.transpose().lazyProduct(of_corners);
   if (!tag.information.allFinite()) return std::nullopt;
 
   CellVote votes(pattern_);

@@ -3,12 +3,12 @@
 
 #include <ceres/jet.h>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
+
+#include "common/dense.h"
 
 namespace mf {
 
@@ -64,8 +64,8 @@ std::optional<Normal> normal_equations(const CameraModel& camera, const Rigid3& 
     }
     const double size = std::sqrt(r.dot(tag.information * r));
     const double weight = size <= tag_huber_width ? 1.0 : tag_huber_width / size;
-    const Eigen::Matrix<double, 6, 8> jt = weight * j.transpose() * tag.information;
-    normal.matrix += jt * j;
+    const Eigen::Matrix<double, 6, 8> jt = weight * j.transpose().lazyProduct(tag.information);
+    normal.matrix += jt.lazyProduct(j);
     normal.right -= jt * r;
   }
   return normal;
@@ -82,9 +82,9 @@ std::optional<Minimum> minimize(const CameraModel& camera, const TargetView& vie
     if (!normal) return std::nullopt;
     Matrix6 damped = normal->matrix;
     damped.diagonal() *= 1 + damping;
-    const Vector6 step = damped.ldlt().solve(normal->right);
-    if (!step.allFinite()) return std::nullopt;
-    const Rigid3 trial = moved(best.pose, step);
+    const std::optional<Eigen::MatrixXd> step = solve_symmetric(damped, normal->right);
+    if (!step) return std::nullopt;
+    const Rigid3 trial = moved(best.pose, *step);
     const double cost = pose_cost(camera, trial, view);
     if (cost <= best.cost) {
       const bool settled = best.cost - cost < 1e-9 * best.cost + 1e-12;
@@ -104,9 +104,12 @@ Rigid3 mirrored_tilt(const Rigid3& pose, const Eigen::Vector3d& centre_in_target
   const Eigen::Vector3d centre = pose * centre_in_target;
   const Eigen::Vector3d sight = centre.normalized();
   const Eigen::Vector3d normal = pose.rotation * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d other = 2 * normal.dot(sight) * sight - normal;
-  Rigid3 out;
-  out.rotation = (Eigen::Quaterniond::FromTwoVectors(normal, other) * pose.rotation).normalized();
+  const Eigen::Vector3d axis = normal.cross(sight);
+  const double sine = axis.norm();
+  Rigid3 out = pose;
+  if (sine > 0)  // from the normal to the line of sight, and as far again
+    out.rotation = Eigen::AngleAxisd(2 * std::atan2(sine, normal.dot(sight)), axis / sine) * pose.rotation;
+  out.rotation.normalize();
   out.translation = centre - out.rotation * centre_in_target;
   return out;
 }
@@ -175,8 +178,7 @@ std::optional<Rigid3> pose_from_homography(const Homography& picture_from_plane,
   m /= behind ? -scale : scale;
   Eigen::Matrix3d r;
   r << m.col(0), m.col(1), m.col(0).cross(m.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(r, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  r = svd.matrixU() * svd.matrixV().transpose();
+  r = nearest_rotation(r);
   return Rigid3{Eigen::Quaterniond(r), m.col(2) - point_in_target.z() * r.col(2)};
 }
 

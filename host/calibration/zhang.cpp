@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/calibration/zhang.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <vector>
+
+#include "common/dense.h"
 
 namespace mf {
 
@@ -37,10 +39,10 @@ std::optional<Eigen::Vector4d> full_solution(const std::vector<Eigen::Matrix3d>&
     v.row(2 * static_cast<Eigen::Index>(i)) = constraint(views[i], 0, 1);
     v.row(2 * static_cast<Eigen::Index>(i) + 1) = constraint(views[i], 0, 0) - constraint(views[i], 1, 1);
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(v, Eigen::ComputeFullV);
+  const NullVector null = null_vector(v);
   constexpr double rank_tolerance = 1e-6;
-  if (svd.singularValues()(3) < rank_tolerance * svd.singularValues()(0)) return std::nullopt;
-  const Eigen::VectorXd b = svd.matrixV().col(4) * (svd.matrixV()(4, 4) < 0 ? -1.0 : 1.0);
+  if (null.singular_values(3) < rank_tolerance * null.singular_values(0)) return std::nullopt;
+  const Eigen::VectorXd b = null.vector * (null.vector(4) < 0 ? -1.0 : 1.0);
   const double cx = -b(2) / b(0);
   const double cy = -b(3) / b(1);
   const double lambda = b(4) - b(2) * b(2) / b(0) - b(3) * b(3) / b(1);

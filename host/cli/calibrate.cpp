@@ -22,6 +22,7 @@ namespace {
 struct Arguments {
   std::filesystem::path session;
   std::filesystem::path colmap;
+  std::string distortion = "automatic";
   CalibrationOptions options;
   bool json = false;
 };
@@ -76,7 +77,12 @@ std::string text_of(const CalibrationResult& result, const nlohmann::json& summa
   return text;
 }
 
-void run(const Arguments& arguments) {
+void run(Arguments& arguments) {
+  const std::optional<DistortionChoice> distortion = parse_distortion_choice(arguments.distortion);
+  if (!distortion)
+    throw InputError("calibrate", "--distortion",
+                     "'" + arguments.distortion + "' is none: use automatic, none, radial, brown or full");
+  arguments.options.distortion = *distortion;
   if (const std::optional<std::string> fault = arguments.options.validate()) throw InputError("options", "", *fault);
   const Progress progress = progress_bar();
   const SessionReader session(arguments.session);
@@ -104,36 +110,24 @@ void run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_calibrate_command(CLI::App& program) {
-  CLI::App* command = program.add_subcommand(
+void add_calibrate_command(CommandLine& program) {
+  CommandLine command = program.command(
       "calibrate", "the camera, the mirror's pose in every frame and the world frame, from tags: calibration.json");
-  // Shared: the callback outlives this function, and CLI11 copies it.
+  // Shared: the callback outlives this function.
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("session", arguments->session, "the session's folder, with response.json")->required();
-  command->add_option("--export-colmap", arguments->colmap, "also write a COLMAP text model with its pictures here");
-  static const std::map<std::string, DistortionChoice> choices{{"automatic", DistortionChoice::automatic},
-                                                               {"none", DistortionChoice::none},
-                                                               {"radial", DistortionChoice::radial},
-                                                               {"brown", DistortionChoice::brown},
-                                                               {"full", DistortionChoice::full}};
-  command
-      ->add_option("--distortion", arguments->options.distortion,
-                   "lens terms to estimate: automatic (what the pictures show), none, radial (k1 k2), brown (k1 k2 p1 "
-                   "p2), full (and k3)")
-      ->transform(CLI::CheckedTransformer(choices))
-      ->default_str("automatic");
-  command->add_flag("--square-pixels", arguments->options.square_pixels, "fx = fy");
-  command
-      ->add_option("--max-rotation-sigma-deg", arguments->options.max_rotation_sigma_deg,
-                   "a frame less certain than this is not used")
-      ->capture_default_str();
-  command
-      ->add_option("--max-position-sigma-m", arguments->options.max_position_sigma_m,
-                   "a frame less certain than this is not used")
-      ->capture_default_str();
-  command->add_option("--threads", arguments->options.threads, "0: as many as the machine has")->capture_default_str();
-  add_json_flag(*command, arguments->json);
-  command->callback([arguments] { run(*arguments); });
+  command.option("session", arguments->session, "the session's folder, with response.json", Presence::required);
+  command.option("--export-colmap", arguments->colmap, "also write a COLMAP text model with its pictures here");
+  command.option("--distortion", arguments->distortion,
+                 "lens terms to estimate: automatic (what the pictures show), none, radial (k1 k2), brown (k1 k2 p1 "
+                 "p2), full (and k3)");
+  command.flag("--square-pixels", arguments->options.square_pixels, "fx = fy");
+  command.option("--max-rotation-sigma-deg", arguments->options.max_rotation_sigma_deg,
+                 "a frame less certain than this is not used");
+  command.option("--max-position-sigma-m", arguments->options.max_position_sigma_m,
+                 "a frame less certain than this is not used");
+  command.option("--threads", arguments->options.threads, "0: as many as the machine has");
+  add_json_flag(command, arguments->json);
+  command.on_run([arguments] { run(*arguments); });
 }
 
 }  // namespace mf

@@ -50,8 +50,8 @@ class Bar {
 
 }  // namespace
 
-void add_json_flag(CLI::App& command, bool& json) {
-  command.add_flag("--json", json, "print what was measured as JSON");
+void add_json_flag(CommandLine& command, bool& json) {
+  command.flag("--json", json, "print what was measured as JSON");
 }
 
 void print_summary(bool json, const nlohmann::json& summary, const std::string& text) {

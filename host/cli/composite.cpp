@@ -40,26 +40,26 @@ void run(Arguments& a) {
   const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
   const LightField field = read_light_field(a.field);
   const CompositeResult r = composite(field, mesh, plate, view, {a.options}, progress_bar());
-  write_picture(a.output, r.picture, a.exposure);
+  write_pictures(a, r.picture);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   nlohmann::json summary = rendering_summary(r.layers, seconds);
   summary["changed"] = r.changed;
   print_summary(
       a.json, summary,
       fmt::format("{} triangles into {} × {}, {} directions on {}, {:.1f} % of the picture changed, {:.1f} s\n"
-                  "{}\n",
+                  "{}",
                   mesh.triangles.size(), plate.width, plate.height, r.layers.lights, r.layers.backend, 100 * r.changed,
-                  seconds, a.output.string()));
+                  seconds, output_lines(a)));
 }
 
 }  // namespace
 
-void add_composite_command(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("composite", "an object and its shadow in a picture of the real place");
+void add_composite_command(CommandLine& program) {
+  CommandLine command = program.command("composite", "an object and its shadow in a picture of the real place");
   const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
-  add_picture_options(*command, *a);
-  command->add_option("--plate", a->plate, "the picture that the object goes into: linear EXR")->required();
-  command->callback([a] { run(*a); });
+  add_picture_options(command, *a);
+  command.option("--plate", a->plate, "the picture that the object goes into: linear EXR", Presence::required);
+  command.on_run([a] { run(*a); });
 }
 
 }  // namespace mf

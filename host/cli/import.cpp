@@ -42,16 +42,15 @@ void run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_import_command(CLI::App& program) {
-  CLI::App* command =
-      program.add_subcommand("import", "frames of any camera, with target and exposures, into a session");
-  // Shared: the callback outlives this function, and CLI11 copies it.
+void add_import_command(CommandLine& program) {
+  CommandLine command = program.command("import", "frames of any camera, with target and exposures, into a session");
+  // Shared: the callback outlives this function.
   auto arguments = std::make_shared<Arguments>();
-  command->add_option("folder", arguments->input.folder, "folder in the import format (docs/import.md)")->required();
-  command->add_option("-o,--output", arguments->options.session, "the session's folder to make")->required();
-  command->add_flag("--overwrite", arguments->options.overwrite, "replace the output when it is a session already");
-  add_json_flag(*command, arguments->json);
-  command->callback([arguments] { run(*arguments); });
+  command.option("folder", arguments->input.folder, "folder in the import format (docs/import.md)", Presence::required);
+  command.option("-o,--output", arguments->options.session, "the session's folder to make", Presence::required);
+  command.flag("--overwrite", arguments->options.overwrite, "replace the output when it is a session already");
+  add_json_flag(command, arguments->json);
+  command.on_run([arguments] { run(*arguments); });
 }
 
 }  // namespace mf

@@ -33,34 +33,25 @@ void run(const Arguments& arguments) {
 
 }  // namespace
 
-void add_photometry_command(CLI::App& program) {
+void add_photometry_command(CommandLine& program) {
   const auto arguments = std::make_shared<Arguments>();  // lives as long as the callback
-  CLI::App* command = program.add_subcommand(
+  CommandLine command = program.command(
       "photometry", "estimate the sensor's response from the session's exposure sweep and write response.json");
   ResponseOptions& response = arguments->options.response;
-  command->add_option("session", arguments->session, "the session's folder")->required();
-  command->add_option("-o,--output", arguments->output, "where to write (SESSION/response.json)");
-  command->add_flag("--linear", arguments->options.linear,
-                    "use no sweep: the sensor is linear from the black level to its last code");
-  command->add_option("--pixels", response.pixels, "pixels of each channel that the fit looks at")
-      ->capture_default_str();
-  command->add_option("--knot_step,--knot-step", response.knot_step, "between the curve's knots, in ln(exposure)")
-      ->capture_default_str();
-  command
-      ->add_option("--kink_scale,--kink-scale", response.kink_scale,
-                   "change of slope from knot to knot that counts as none")
-      ->capture_default_str();
-  command
-      ->add_option("--outlier_sigmas,--outlier-sigmas", response.outlier_sigmas, "readings off by more lose their say")
-      ->capture_default_str();
-  command->add_option("--max_iterations,--max-iterations", response.max_iterations, "of Gauss-Newton")
-      ->capture_default_str();
-  command
-      ->add_option("--noise_limit,--noise-limit", response.noise_limit,
-                   "self-consistency counts readings less noisy than this")
-      ->capture_default_str();
-  add_json_flag(*command, arguments->json);
-  command->callback([arguments] { run(*arguments); });
+  command.option("session", arguments->session, "the session's folder", Presence::required);
+  command.option("-o,--output", arguments->output, "where to write (SESSION/response.json)");
+  command.flag("--linear", arguments->options.linear,
+               "use no sweep: the sensor is linear from the black level to its last code");
+  command.option("--pixels", response.pixels, "pixels of each channel that the fit looks at");
+  command.option("--knot_step,--knot-step", response.knot_step, "between the curve's knots, in ln(exposure)");
+  command.option("--kink_scale,--kink-scale", response.kink_scale,
+                 "change of slope from knot to knot that counts as none");
+  command.option("--outlier_sigmas,--outlier-sigmas", response.outlier_sigmas, "readings off by more lose their say");
+  command.option("--max_iterations,--max-iterations", response.max_iterations, "of Gauss-Newton");
+  command.option("--noise_limit,--noise-limit", response.noise_limit,
+                 "self-consistency counts readings less noisy than this");
+  add_json_flag(command, arguments->json);
+  command.on_run([arguments] { run(*arguments); });
 }
 
 }  // namespace mf

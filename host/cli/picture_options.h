@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "common/command_line/command_line.h"
 #include "common/image.h"
 #include "host/render/render.h"
 
@@ -17,7 +18,7 @@ struct PictureArguments {
   std::filesystem::path field;
   std::filesystem::path object;
   std::filesystem::path cameras;
-  std::filesystem::path output;
+  std::vector<std::filesystem::path> outputs;  // .exr or .png each
   int view = 0;
   std::optional<double> albedo;
   std::string backend = "auto";
@@ -25,14 +26,15 @@ struct PictureArguments {
   RenderOptions options;
   bool json = false;
 };
-void add_picture_options(CLI::App& command, PictureArguments&);
+void add_picture_options(CommandLine& command, PictureArguments&);
 
 // Throws InputError naming the command and the flag for a value that no rendering can have, and for an output that is
 // neither .exr nor .png.
 void check_picture_arguments(const std::string& command, PictureArguments&);
 
-// Linear, three or four channels, as half-float EXR, or PNG (sRGB, times `exposure`, over black). By the file's name.
-void write_picture(const std::filesystem::path&, const ImageF&, double exposure);
+// Linear, three or four channels, to every output: half-float EXR, or PNG (sRGB, times the exposure, over black).
+void write_pictures(const PictureArguments&, const ImageF&);
+[[nodiscard]] std::string output_lines(const PictureArguments&);  // their names, a line each
 
 // Figures of a rendering for --json.
 [[nodiscard]] nlohmann::json rendering_summary(const RenderResult&, double seconds);

@@ -75,18 +75,17 @@ void run(const Arguments& a) {
 
 }  // namespace
 
-void add_probe_command(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("probe", "the light at one point as a lat-long picture");
+void add_probe_command(CommandLine& program) {
+  CommandLine command = program.command("probe", "the light at one point as a lat-long picture");
   const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
-  command->add_option("field", a->field, "light field (.lf.exr)")->required();
-  command->add_option("--at", a->at, "x y z of the point, world metres")->expected(3)->required();
-  command->add_option("--for", a->consumer, "orientation: blender, openexr (USD, Mitsuba) or threejs")
-      ->capture_default_str();
-  command->add_option("--width", a->width, "pixels across; the height is half of it")->capture_default_str();
-  command->add_option("-o,--output", a->output, "lat-long EXR to write")->required();
-  command->add_option("--confidence", a->confidence, "also write the confidence (0…1) as an EXR");
-  add_json_flag(*command, a->json);
-  command->callback([a] { run(*a); });
+  command.option("field", a->field, "light field (.lf.exr)", Presence::required);
+  command.values("--at", 3, a->at, "x y z of the point, world metres", Presence::required);
+  command.option("--for", a->consumer, "orientation: blender, openexr (USD, Mitsuba) or threejs");
+  command.option("--width", a->width, "pixels across; the height is half of it");
+  command.option("-o,--output", a->output, "lat-long EXR to write", Presence::required);
+  command.option("--confidence", a->confidence, "also write the confidence (0…1) as an EXR");
+  add_json_flag(command, a->json);
+  command.on_run([a] { run(*a); });
 }
 
 }  // namespace mf

@@ -132,26 +132,21 @@ void run(const Arguments& a) {
 
 }  // namespace
 
-void add_process_command(CLI::App& program) {
-  CLI::App* command = program.add_subcommand(
+void add_process_command(CommandLine& program) {
+  CommandLine command = program.command(
       "process", "photometry, calibration, light field and probe of a session in one go, and a report (report.html)");
   const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
-  command->add_option("session", a->session, "session folder; response.json and calibration.json are written there")
-      ->required();
-  command->add_option("-o,--output", a->output, "folder for the results")->required();
-  command->add_flag("--linear", a->photometry.linear,
-                    "use no exposure sweep: the sensor is linear from the black level to its last code");
-  command
-      ->add_option("--height", a->resample.height_m, "height of the light-field plane above the world's ground, metres")
-      ->capture_default_str();
-  command->add_option("--directions", a->resample.directions, "about how many directions over the hemisphere")
-      ->capture_default_str();
-  command->add_option("--size", a->resample.size, "texels along each side of the plane's rectangle")
-      ->capture_default_str();
-  command->add_option("--proxy", a->resample.proxy, "what the views are focused on, as for `resample`")
-      ->capture_default_str();
-  add_json_flag(*command, a->json);
-  command->callback([a] { run(*a); });
+  command.option("session", a->session, "session folder; response.json and calibration.json are written there",
+                 Presence::required);
+  command.option("-o,--output", a->output, "folder for the results", Presence::required);
+  command.flag("--linear", a->photometry.linear,
+               "use no exposure sweep: the sensor is linear from the black level to its last code");
+  command.option("--height", a->resample.height_m, "height of the light-field plane above the world's ground, metres");
+  command.option("--directions", a->resample.directions, "about how many directions over the hemisphere");
+  command.option("--size", a->resample.size, "texels along each side of the plane's rectangle");
+  command.option("--proxy", a->resample.proxy, "what the views are focused on, as for `resample`");
+  add_json_flag(command, a->json);
+  command.on_run([a] { run(*a); });
 }
 
 }  // namespace mf

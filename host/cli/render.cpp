@@ -53,27 +53,24 @@ void run(Arguments& a) {
   const RenderResult r = render(input, a.options, progress_bar());
   ImageF picture = r.object;
   if (a.ground_albedo) add_ground(picture, r, *a.ground_albedo);
-  write_picture(a.output, picture, a.exposure);
+  write_pictures(a, picture);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  print_summary(
-      a.json, rendering_summary(r, seconds),
-      fmt::format("{} × {}, {} triangles, {} directions on {}, {:.1f} s\n{}\n", view.camera.width, view.camera.height,
-                  mesh.triangles.size(), r.lights, r.backend, seconds, a.output.string()));
+  print_summary(a.json, rendering_summary(r, seconds),
+                fmt::format("{} × {}, {} triangles, {} directions on {}, {:.1f} s\n{}", view.camera.width,
+                            view.camera.height, mesh.triangles.size(), r.lights, r.backend, seconds, output_lines(a)));
 }
 
 }  // namespace
 
-void add_render_command(CLI::App& program) {
-  CLI::App* command = program.add_subcommand("render", "an object in the captured light");
+void add_render_command(CommandLine& program) {
+  CommandLine command = program.command("render", "an object in the captured light");
   const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
-  add_picture_options(*command, *a);
-  command->add_option("--ground-albedo", a->ground_albedo,
-                      "show the light field's plane too, as a diffuse ground of this albedo");
-  command
-      ->add_option("--size", a->size_px,
-                   "width and height in pixels (default: the file's, or twice the principal point)")
-      ->expected(2);
-  command->callback([a] { run(*a); });
+  add_picture_options(command, *a);
+  command.option("--ground-albedo", a->ground_albedo,
+                 "show the light field's plane too, as a diffuse ground of this albedo");
+  command.values("--size", 2, a->size_px,
+                 "width and height in pixels (default: the file's, or twice the principal point)");
+  command.on_run([a] { run(*a); });
 }
 
 }  // namespace mf

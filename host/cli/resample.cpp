@@ -90,32 +90,23 @@ ResampleResult run_resample(const std::filesystem::path& folder, const std::file
   return result;
 }
 
-void add_resample_command(CLI::App& program) {
-  CLI::App* command =
-      program.add_subcommand("resample", "resample a calibrated session into an incident light field (.lf.exr)");
+void add_resample_command(CommandLine& program) {
+  CommandLine command =
+      program.command("resample", "resample a calibrated session into an incident light field (.lf.exr)");
   const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
-  command->add_option("session", a->session, "session folder with response.json and calibration.json")->required();
-  command->add_option("-o,--output", a->output, "light field to write, NAME.lf.exr")->required();
-  command
-      ->add_option("--height", a->options.height_m, "height of the light-field plane above the world's ground, metres")
-      ->capture_default_str();
-  command->add_option("--directions", a->options.directions, "about how many directions over the hemisphere")
-      ->capture_default_str();
-  command->add_option("--size", a->options.size, "texels along each side of the plane's rectangle")
-      ->capture_default_str();
-  command
-      ->add_option("--proxy", a->options.proxy,
-                   "what the views are focused on: auto (a distance per direction), sphere (the best radius), sphere:R "
-                   "(metres), sphere:inf, plane")
-      ->capture_default_str();
-  command->add_option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)")
-      ->capture_default_str();
-  command
-      ->add_option("--rectangle", a->rectangle,
-                   "x0 y0 x1 y1 of the plane's rectangle, world metres (default: where the mirror swept)")
-      ->expected(4);
-  add_json_flag(*command, a->json);
-  command->callback([a] { run(*a); });
+  command.option("session", a->session, "session folder with response.json and calibration.json", Presence::required);
+  command.option("-o,--output", a->output, "light field to write, NAME.lf.exr", Presence::required);
+  command.option("--height", a->options.height_m, "height of the light-field plane above the world's ground, metres");
+  command.option("--directions", a->options.directions, "about how many directions over the hemisphere");
+  command.option("--size", a->options.size, "texels along each side of the plane's rectangle");
+  command.option("--proxy", a->options.proxy,
+                 "what the views are focused on: auto (a distance per direction), sphere (the best radius), sphere:R "
+                 "(metres), sphere:inf, plane");
+  command.option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)");
+  command.values("--rectangle", 4, a->rectangle,
+                 "x0 y0 x1 y1 of the plane's rectangle, world metres (default: where the mirror swept)");
+  add_json_flag(command, a->json);
+  command.on_run([a] { run(*a); });
 }
 
 }  // namespace mf

@@ -10,7 +10,7 @@ namespace mf {
 namespace {
 
 constexpr double cell_m = 0.01;
-constexpr int cells = 400;            // 4 × 4 m about the middle of the footprints
+constexpr int grid_cells = 400;       // 4 × 4 m about the middle of the footprints
 constexpr double needed_share = 0.1;  // of the views that pass the best-covered point
 constexpr double lowest_slope = 0.1;  // z of a unit ray: flatter ones reach the plane far outside
 
@@ -68,19 +68,19 @@ std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, 
     ys.push_back(centre.y());
   }
   if (footprints.empty()) return std::nullopt;
-  const Eigen::Vector2d origin = Eigen::Vector2d(median(xs), median(ys)).array() - 0.5 * cells * cell_m;
-  std::vector<int> count(static_cast<std::size_t>(cells) * cells, 0);
+  const Eigen::Vector2d origin = Eigen::Vector2d(median(xs), median(ys)).array() - 0.5 * grid_cells * cell_m;
+  std::vector<int> count(static_cast<std::size_t>(grid_cells) * grid_cells, 0);
   for (const Footprint& f : footprints)
-    for (int y = 0; y < cells; ++y)
-      for (int x = 0; x < cells; ++x)
+    for (int y = 0; y < grid_cells; ++y)
+      for (int x = 0; x < grid_cells; ++x)
         if (inside_convex(f, origin + cell_m * Eigen::Vector2d(x + 0.5, y + 0.5)))
-          ++count[static_cast<std::size_t>(y * cells + x)];
+          ++count[static_cast<std::size_t>(y * grid_cells + x)];
   const int needed =
       std::max(1, static_cast<int>(std::ceil(needed_share * *std::max_element(count.begin(), count.end()))));
-  Eigen::Vector2i low(cells, cells), high(-1, -1);
-  for (int y = 0; y < cells; ++y)
-    for (int x = 0; x < cells; ++x)
-      if (count[static_cast<std::size_t>(y * cells + x)] >= needed) {
+  Eigen::Vector2i low(grid_cells, grid_cells), high(-1, -1);
+  for (int y = 0; y < grid_cells; ++y)
+    for (int x = 0; x < grid_cells; ++x)
+      if (count[static_cast<std::size_t>(y * grid_cells + x)] >= needed) {
         low = low.cwiseMin(Eigen::Vector2i(x, y));
         high = high.cwiseMax(Eigen::Vector2i(x + 1, y + 1));
       }

@@ -45,7 +45,7 @@ void ask_about_emitter(const std::vector<FieldView>& views, std::span<const std:
 }
 
 float log_luminance(const Eigen::Vector4f& seen) {
-  return std::log2(std::max((0.2126F * seen.x() + 0.7152F * seen.y() + 0.0722F * seen.z()) / seen.w(), 1e-3F));
+  return std::log2(std::max(shown_luminance(seen), 1e-3F));
 }
 
 // The emitter's own radiance: the median of what views show of its centre where nothing hides it, since occluders only

@@ -21,10 +21,6 @@ constexpr double unhidden = 0.8;      // of the views at a place, ordered by bri
 constexpr std::size_t fewest = 6;     // views that look at a place
 constexpr float clear_weight = 0.8F;  // a view that shows less of a place is at its own border
 
-float luminance(const Eigen::Vector4f& seen) {
-  return (0.2126F * seen.x() + 0.7152F * seen.y() + 0.0722F * seen.z()) / seen.w();
-}
-
 // What the views' brighter part shows at an offset from the emitter's centre, in the frame across each view's line of
 // sight whose first axis is level: all views of a plane look up at a lamp from one side, and agree on it nearly.
 std::optional<float> shown_at(const std::vector<FieldView>& views, const Emitter& e, const Eigen::Vector2f& offset_m) {
@@ -38,7 +34,7 @@ std::optional<float> shown_at(const std::vector<FieldView>& views, const Emitter
     const Eigen::Vector3f pixel = pixel_of(view, point.homogeneous());
     if (pixel.z() <= 0) continue;
     const Eigen::Vector4f seen = view.fetch(0, pixel.x() / pixel.z(), pixel.y() / pixel.z());
-    if (seen.w() >= clear_weight) seen_by.push_back(luminance(seen));
+    if (seen.w() >= clear_weight) seen_by.push_back(shown_luminance(seen));
   }
   if (seen_by.size() < fewest) return std::nullopt;
   const auto at = seen_by.begin() + static_cast<std::ptrdiff_t>(unhidden * static_cast<double>(seen_by.size() - 1));

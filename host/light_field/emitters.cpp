@@ -16,7 +16,7 @@ namespace mf {
 namespace {
 
 constexpr int spot_level = 2;         // level in which spots are looked for: a few pixels, so that noise is no lamp
-constexpr float clear_weight = 0.9F;  // a spot that touches the border may be cut off
+constexpr float uncut_weight = 0.9F;  // a spot that touches the border may be cut off
 constexpr int proposals = 400;        // pairs of rays tried for one emitter
 constexpr float least_parallax_rad = 0.02F;  // between two rays that propose a position
 
@@ -26,16 +26,11 @@ struct Spot {
   float radius_rad = 0;       // of a disc of its solid angle
 };
 
-float luminance(const Eigen::Vector4f& premultiplied) {
-  if (premultiplied.w() <= 0) return 0;
-  return (0.2126F * premultiplied.x() + 0.7152F * premultiplied.y() + 0.0722F * premultiplied.z()) / premultiplied.w();
-}
-
 float mean_luminance(const std::vector<FieldView>& views) {
   double sum = 0, weight = 0;
   for (const FieldView& view : views) {
     const Eigen::Vector4f all = view.levels.back().at(0, 0);
-    sum += static_cast<double>(luminance(all) * all.w());
+    sum += static_cast<double>(shown_luminance(all) * all.w());
     weight += static_cast<double>(all.w());
   }
   return weight > 0 ? static_cast<float>(sum / weight) : 0;
@@ -64,19 +59,19 @@ Area flood(const PremultipliedImage& image, int x, int y, float threshold, std::
     const Eigen::Vector2i at = open.back();
     open.pop_back();
     const Eigen::Vector4f& texel = image.at(at.x(), at.y());
-    area.cut = area.cut || texel.w() < clear_weight;
+    area.cut = area.cut || texel.w() < uncut_weight;
     // Above a few times the threshold all of a lamp counts alike: the centroid is of its shape, not of its glints.
-    const float weight = std::min(luminance(texel), 4 * threshold);
+    const float weight = std::min(shown_luminance(texel), 4 * threshold);
     area.weighted_sum += weight * (at.cast<float>().array() + 0.5F).matrix();
     area.weight += weight;
-    area.luminance_sum += luminance(texel);
-    area.luminance_max = std::max(area.luminance_max, luminance(texel));
+    area.luminance_sum += shown_luminance(texel);
+    area.luminance_max = std::max(area.luminance_max, shown_luminance(texel));
     for (int side = 0; side < 4; ++side) {
       const Eigen::Vector2i step(side == 0 ? 1 : side == 1 ? -1 : 0, side == 2 ? 1 : side == 3 ? -1 : 0);
       const Eigen::Vector2i next = at + step;
       if ((next.array() < 0).any() || next.x() >= image.width() || next.y() >= image.height()) continue;
       char& seen = visited[static_cast<std::size_t>(next.y() * image.width() + next.x())];
-      if (seen != 0 || luminance(image.at(next.x(), next.y())) < threshold) continue;
+      if (seen != 0 || shown_luminance(image.at(next.x(), next.y())) < threshold) continue;
       seen = 1;
       open.push_back(next);
     }
@@ -91,13 +86,13 @@ void collect_spots(const FieldView& view, float threshold, const EmitterOptions&
   std::vector<char> visited(static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()), 0);
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
-      if (visited[static_cast<std::size_t>(y * image.width() + x)] != 0 || luminance(image.at(x, y)) < threshold)
+      if (visited[static_cast<std::size_t>(y * image.width() + x)] != 0 || shown_luminance(image.at(x, y)) < threshold)
         continue;
       const Area area = flood(image, x, y, threshold, visited);
       const Eigen::Vector2f centre = area.weighted_sum / area.weight * scale;
       // Pixels at its edge hold only a part of it: the area is that of the same light at full brightness, which a small
       // lamp has only in the finest level.
-      const float peak = std::max(area.luminance_max, luminance(view.fetch(0, centre.x(), centre.y())));
+      const float peak = std::max(area.luminance_max, shown_luminance(view.fetch(0, centre.x(), centre.y())));
       const float pixels = area.luminance_sum / peak;
       const Eigen::Vector3f ray = ray_of(view, centre.x(), centre.y());
       // A pixel's solid angle falls with the cube of the cosine to the axis.

@@ -48,6 +48,12 @@ class PremultipliedImage {
   std::vector<Eigen::Vector4f> texels_;
 };
 
+// Luminance (Rec. 709) of what a premultiplied texel or window shows; 0 where nothing does.
+[[nodiscard]] inline float shown_luminance(const Eigen::Vector4f& premultiplied) {
+  if (premultiplied.w() <= 0) return 0;
+  return (0.2126F * premultiplied.x() + 0.7152F * premultiplied.y() + 0.0722F * premultiplied.z()) / premultiplied.w();
+}
+
 // One mirror frame as a captured view: radiance in the mirror's opening, ready to be looked up from the world.
 //
 // The view is an ideal pinhole (lens distortion undone) whose centre lies behind the mirror. The weight a is Buehler's

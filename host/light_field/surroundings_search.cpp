@@ -16,7 +16,7 @@ namespace mf {
 
 namespace {
 
-constexpr float clear_weight = 0.5F;       // views nearer to their border than this do not vote
+constexpr float voting_weight = 0.5F;      // views nearer to their border than this do not vote
 constexpr float darkest_radiance = 1e-4F;  // below, the logarithm only magnifies noise
 
 // log2 luminance of what a view shows of the proxy point, over about `angle_rad`; nothing when it does not see it.
@@ -25,9 +25,8 @@ std::optional<float> log_luminance(const FieldView& view, const ProxyPoint& x, f
   if (pixel.z() <= 0) return std::nullopt;
   const Eigen::Vector4f seen =
       view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-  if (seen.w() < clear_weight) return std::nullopt;
-  const float luminance = (0.2126F * seen.x() + 0.7152F * seen.y() + 0.0722F * seen.z()) / seen.w();
-  return std::log2(std::max(luminance, darkest_radiance));
+  if (seen.w() < voting_weight) return std::nullopt;
+  return std::log2(std::max(shown_luminance(seen), darkest_radiance));
 }
 
 // Mean distance from the median, each at most `limit`: what a view behind an occluder says counts once, not fully.

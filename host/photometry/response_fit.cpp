@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/photometry/response_fit.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+
+#include "common/dense.h"
 
 namespace mf {
 
@@ -291,9 +294,11 @@ class Fit {
     for (int attempt = 0; attempt < 8; ++attempt) {
       Matrix damped = normal.matrix;
       damped.diagonal().array() += damping_ * (normal.matrix.diagonal().array() + 1e-3);
-      const Vector step = damped.ldlt().solve(normal.right);
+      const std::optional<Matrix> solution = solve_symmetric(damped, normal.right);
+      const Vector step =
+          solution ? Vector(*solution) : Vector::Constant(n + 1, std::numeric_limits<double>::infinity()).eval();
       const double largest = step.head(n).cwiseAbs().maxCoeff();
-      if (step.allFinite() && largest < 3) {
+      if (largest < 3) {
         std::vector<double> q = curve_.log_increments();
         for (Eigen::Index i = 0; i < n; ++i) q[static_cast<std::size_t>(i)] += step[i];
         const CodeSpline next(curve_.first_u(), curve_.step(), curve_.black() + step[n], q);
@@ -315,7 +320,8 @@ class Fit {
     Normal normal = normal_equations();
     normal.matrix.diagonal().array() += 1e-9 * normal.matrix.diagonal().mean();  // the scale is free
     const Eigen::Index size = normal.right.size();
-    const Matrix covariance = normal.matrix.ldlt().solve(Matrix::Identity(size, size));
+    const Matrix covariance =
+        solve_symmetric(normal.matrix, Matrix::Identity(size, size)).value_or(Matrix::Zero(size, size));
     ChannelFit fit{curve_, 0, noise_, over_coefficients(covariance), iterations, converged};
     if (problem_.black_sigma > 0) fit.black_sigma = std::sqrt(std::max(0.0, covariance(size - 1, size - 1)));
     return fit;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "common/dense.h"
 #include "host/photometry/response_fit.h"
 
 namespace mf {
@@ -131,8 +132,10 @@ std::optional<CodeSpline> rough_curve(const FitProblem& problem, const FitOption
   const double typical = normal.trace() / knot_count;
   add_smoothness(1e-3 * typical, normal);
   normal.diagonal().array() += 1e-9 * typical;  // the scale is free
-  curve.value = normal.ldlt().solve(right);
-  if (!curve.value.allFinite() || !(curve.value[knot_count - 1] > curve.value[0])) return std::nullopt;
+  const std::optional<Eigen::MatrixXd> solution = solve_symmetric(normal, right);
+  if (!solution) return std::nullopt;
+  curve.value = *solution;
+  if (!(curve.value[knot_count - 1] > curve.value[0])) return std::nullopt;
   return spline_through(CodeOverU(curve, 1e-4), problem, options);
 }
 

@@ -109,9 +109,10 @@ const std::vector<Library>& known_libraries() {
 const std::vector<FolderRule>& include_table() {
   static const std::vector<FolderRule> table{
       {"common/", {}, vocabulary + Names{"SQLite", "TIFF", "AprilTag"}},
+      {"common/command_line/", {}, Names{"fmt", "CLI11"}},
       {"device/", {"common/"}, vocabulary + Names{"Aravis", "V4L2", "libusb", "libevdev", "libudev", "systemd"}},
       // The simulator writes the import format: frames as PNG, truth as EXR, tags as AprilTag draws them.
-      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "CLI11"}},
+      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
@@ -124,7 +125,7 @@ const std::vector<FolderRule>& include_table() {
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
       {"host/report/", stage_headers + records, stage_libraries},
-      {"host/cli/", {"common/", "host/"}, stage_libraries + Names{"CLI11"}},
+      {"host/cli/", {"common/", "host/"}, stage_libraries},
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},
        stage_libraries + Names{"GoogleTest", "benchmark", "OpenCV", "Ceres", "SQLite", "TIFF", "PNG", "OpenEXR",
