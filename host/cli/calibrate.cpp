@@ -19,17 +19,13 @@ namespace mf {
 
 namespace {
 
-struct Arguments {
+struct CalibrateArguments {
   std::filesystem::path session;
   std::filesystem::path colmap;
   std::string distortion = "automatic";
   CalibrationOptions options;
   bool json = false;
 };
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 nlohmann::json summary_of(const CalibrationResult& result) {
   const Calibration& c = result.calibration;
@@ -77,7 +73,7 @@ std::string text_of(const CalibrationResult& result, const nlohmann::json& summa
   return text;
 }
 
-void run(Arguments& arguments) {
+void run(CalibrateArguments& arguments) {
   const std::optional<DistortionChoice> distortion = parse_distortion_choice(arguments.distortion);
   if (!distortion)
     throw InputError("calibrate", "--distortion",
@@ -114,7 +110,7 @@ void add_calibrate_command(CommandLine& program) {
   CommandLine command = program.command(
       "calibrate", "the camera, the mirror's pose in every frame and the world frame, from tags: calibration.json");
   // Shared: the callback outlives this function.
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateArguments>();
   command.option("session", arguments->session, "the session's folder, with response.json", Presence::required);
   command.option("--export-colmap", arguments->colmap, "also write a COLMAP text model with its pictures here");
   command.option("--distortion", arguments->distortion,

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -59,6 +58,10 @@ void print_summary(bool json, const nlohmann::json& summary, const std::string& 
     fmt::print("{}\n", summary.dump(1));
   else
     fmt::print("{}", text);
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 Progress progress_bar() {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -24,6 +25,8 @@ void add_json_flag(CommandLine& command, bool& json);
 
 // Prints `summary` as JSON (json) or `text` for people.
 void print_summary(bool json, const nlohmann::json& summary, const std::string& text);
+
+[[nodiscard]] double seconds_since(std::chrono::steady_clock::time_point start);
 
 // A progress bar on standard error; it appears when work takes longer than two seconds, and only on a terminal.
 [[nodiscard]] Progress progress_bar();

@@ -17,7 +17,7 @@ namespace mf {
 
 namespace {
 
-struct Arguments : PictureArguments {
+struct CompositeArguments : PictureArguments {
   std::filesystem::path plate;
 };
 
@@ -32,7 +32,7 @@ ImageF read_plate(const std::filesystem::path& path) {
   return colour;
 }
 
-void run(Arguments& a) {
+void run(CompositeArguments& a) {
   const auto start = std::chrono::steady_clock::now();
   check_picture_arguments("composite", a);
   const ImageF plate = read_plate(a.plate);
@@ -41,7 +41,7 @@ void run(Arguments& a) {
   const LightField field = read_light_field(a.field);
   const CompositeResult r = composite(field, mesh, plate, view, {a.options}, progress_bar());
   write_pictures(a, r.picture);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   nlohmann::json summary = rendering_summary(r.layers, seconds);
   summary["changed"] = r.changed;
   print_summary(
@@ -56,7 +56,7 @@ void run(Arguments& a) {
 
 void add_composite_command(CommandLine& program) {
   CommandLine command = program.command("composite", "an object and its shadow in a picture of the real place");
-  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  const auto a = std::make_shared<CompositeArguments>();  // shared: the parser's callback outlives this function
   add_picture_options(command, *a);
   command.option("--plate", a->plate, "the picture that the object goes into: linear EXR", Presence::required);
   command.on_run([a] { run(*a); });

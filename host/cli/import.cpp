@@ -11,13 +11,13 @@ namespace mf {
 
 namespace {
 
-struct Arguments {
+struct ImportArguments {
   ImportInput input;
   ImportOptions options;
   bool json = false;
 };
 
-void run(const Arguments& arguments) {
+void run(const ImportArguments& arguments) {
   const ImportResult result = import_session(arguments.input, arguments.options, progress_bar());
   const std::string format = pixel_format_name(result.format);
   const nlohmann::json summary{{"session", arguments.options.session.string()},
@@ -45,7 +45,7 @@ void run(const Arguments& arguments) {
 void add_import_command(CommandLine& program) {
   CommandLine command = program.command("import", "frames of any camera, with target and exposures, into a session");
   // Shared: the callback outlives this function.
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ImportArguments>();
   command.option("folder", arguments->input.folder, "folder in the import format (docs/import.md)", Presence::required);
   command.option("-o,--output", arguments->options.session, "the session's folder to make", Presence::required);
   command.flag("--overwrite", arguments->options.overwrite, "replace the output when it is a session already");

@@ -13,14 +13,14 @@ namespace mf {
 
 namespace {
 
-struct Arguments {
+struct PhotometryArguments {
   std::filesystem::path session;
   std::filesystem::path output;
   PhotometryOptions options;
   bool json = false;
 };
 
-void run(const Arguments& arguments) {
+void run(const PhotometryArguments& arguments) {
   const SessionReader session(arguments.session);
   const PhotometryResult result = photometry(session, arguments.options, progress_bar());
   const std::filesystem::path output =
@@ -34,7 +34,7 @@ void run(const Arguments& arguments) {
 }  // namespace
 
 void add_photometry_command(CommandLine& program) {
-  const auto arguments = std::make_shared<Arguments>();  // lives as long as the callback
+  const auto arguments = std::make_shared<PhotometryArguments>();  // lives as long as the callback
   CommandLine command = program.command(
       "photometry", "estimate the sensor's response from the session's exposure sweep and write response.json");
   ResponseOptions& response = arguments->options.response;

@@ -13,7 +13,7 @@ namespace mf {
 
 namespace {
 
-struct Arguments {
+struct ProbeArguments {
   std::filesystem::path field;
   std::filesystem::path output;
   std::filesystem::path confidence;
@@ -48,7 +48,7 @@ ProbeFigures measure(const Probe& probe, LatLongConvention convention) {
   return figures;
 }
 
-void run(const Arguments& a) {
+void run(const ProbeArguments& a) {
   const auto convention = parse_lat_long_convention(a.consumer);
   if (!convention)
     throw InputError("probe", "--for",
@@ -77,7 +77,7 @@ void run(const Arguments& a) {
 
 void add_probe_command(CommandLine& program) {
   CommandLine command = program.command("probe", "the light at one point as a lat-long picture");
-  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  const auto a = std::make_shared<ProbeArguments>();  // shared: the parser's callback outlives this function
   command.option("field", a->field, "light field (.lf.exr)", Presence::required);
   command.values("--at", 3, a->at, "x y z of the point, world metres", Presence::required);
   command.option("--for", a->consumer, "orientation: blender, openexr (USD, Mitsuba) or threejs");

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 constexpr double probe_height_m = 0.1;  // above the plane's middle: where a small object's own middle would be
 constexpr int probe_width_px = 1024;
 
-struct Arguments {
+struct ProcessArguments {
   fs::path session;
   fs::path output;
   PhotometryOptions photometry;
@@ -43,7 +43,7 @@ template <typename Stage>
 auto timed(std::map<std::string, double>& seconds, const std::string& name, const Stage& stage) {
   const auto start = std::chrono::steady_clock::now();
   auto result = stage();
-  seconds[name] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  seconds[name] = seconds_since(start);
   return result;
 }
 
@@ -81,18 +81,18 @@ std::size_t used_frames(const Calibration& calibration) {
                                                 [](const MirrorPose& pose) { return pose.used; }));
 }
 
-void check_options(const Arguments& a) {
+void check_options(const ProcessArguments& a) {
   for (const auto& problem : {a.photometry.validate(), a.calibration.validate(), a.resample.validate()})
     if (problem) throw InputError("process", "options", *problem);
 }
 
-void create_output_folder(const Arguments& a) {
+void create_output_folder(const ProcessArguments& a) {
   std::error_code error;
   fs::create_directories(a.output, error);
   if (error) throw InputError(a.output.string(), "", "cannot be created: " + error.message());
 }
 
-void run(const Arguments& a) {
+void run(const ProcessArguments& a) {
   check_options(a);
   const SessionReader session(a.session);
   create_output_folder(a);
@@ -135,7 +135,7 @@ void run(const Arguments& a) {
 void add_process_command(CommandLine& program) {
   CommandLine command = program.command(
       "process", "photometry, calibration, light field and probe of a session in one go, and a report (report.html)");
-  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  const auto a = std::make_shared<ProcessArguments>();  // shared: the parser's callback outlives this function
   command.option("session", a->session, "session folder; response.json and calibration.json are written there",
                  Presence::required);
   command.option("-o,--output", a->output, "folder for the results", Presence::required);

@@ -15,7 +15,7 @@ namespace mf {
 
 namespace {
 
-struct Arguments : PictureArguments {
+struct RenderArguments : PictureArguments {
   std::optional<double> ground_albedo;
   std::vector<int> size_px;
 };
@@ -34,7 +34,7 @@ void add_ground(ImageF& picture, const RenderResult& r, double albedo) {
   }
 }
 
-void run(Arguments& a) {
+void run(RenderArguments& a) {
   const auto start = std::chrono::steady_clock::now();
   check_picture_arguments("render", a);
   if (a.ground_albedo && !(*a.ground_albedo >= 0 && *a.ground_albedo <= 1))
@@ -54,7 +54,7 @@ void run(Arguments& a) {
   ImageF picture = r.object;
   if (a.ground_albedo) add_ground(picture, r, *a.ground_albedo);
   write_pictures(a, picture);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
   print_summary(a.json, rendering_summary(r, seconds),
                 fmt::format("{} × {}, {} triangles, {} directions on {}, {:.1f} s\n{}", view.camera.width,
                             view.camera.height, mesh.triangles.size(), r.lights, r.backend, seconds, output_lines(a)));
@@ -64,7 +64,7 @@ void run(Arguments& a) {
 
 void add_render_command(CommandLine& program) {
   CommandLine command = program.command("render", "an object in the captured light");
-  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  const auto a = std::make_shared<RenderArguments>();  // shared: the parser's callback outlives this function
   add_picture_options(command, *a);
   command.option("--ground-albedo", a->ground_albedo,
                  "show the light field's plane too, as a diffuse ground of this albedo");

@@ -16,17 +16,13 @@ namespace mf {
 
 namespace {
 
-struct Arguments {
+struct ResampleArguments {
   std::filesystem::path session;
   std::filesystem::path output;
   ResampleOptions options;
   std::vector<double> rectangle;
   bool json = false;
 };
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 nlohmann::json summarize(const ResampleResult& r) {
   nlohmann::json scores = nlohmann::json::array();
@@ -45,7 +41,7 @@ nlohmann::json summarize(const ResampleResult& r) {
           {"seconds", r.seconds}};
 }
 
-void run(Arguments& a) {
+void run(ResampleArguments& a) {
   if (!a.rectangle.empty())
     a.options.rectangle = std::array<double, 4>{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
   const ResampleResult r = run_resample(a.session, a.output, a.options, progress_bar());
@@ -93,7 +89,7 @@ ResampleResult run_resample(const std::filesystem::path& folder, const std::file
 void add_resample_command(CommandLine& program) {
   CommandLine command =
       program.command("resample", "resample a calibrated session into an incident light field (.lf.exr)");
-  const auto a = std::make_shared<Arguments>();  // shared: the parser's callback outlives this function
+  const auto a = std::make_shared<ResampleArguments>();  // shared: the parser's callback outlives this function
   command.option("session", a->session, "session folder with response.json and calibration.json", Presence::required);
   command.option("-o,--output", a->output, "light field to write, NAME.lf.exr", Presence::required);
   command.option("--height", a->options.height_m, "height of the light-field plane above the world's ground, metres");
