@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -46,6 +47,19 @@ CREATE TABLE frames (
   crc32      INTEGER NOT NULL,
   UNIQUE (role, name)
 );
+CREATE TABLE arrivals (
+  frame        INTEGER PRIMARY KEY REFERENCES frames (id),
+  device_frame INTEGER NOT NULL,
+  device_ns    INTEGER NOT NULL,
+  monotonic_ns INTEGER NOT NULL,
+  realtime_ns  INTEGER NOT NULL
+);
+CREATE TABLE gaps (
+  next_id      INTEGER NOT NULL,
+  missing      INTEGER NOT NULL,
+  monotonic_ns INTEGER NOT NULL,
+  reason       TEXT NOT NULL
+);
 )sql";
 
 fs::path index_file(const fs::path& folder) {
@@ -74,15 +88,26 @@ int height_of(const FramePixels& pixels) {
 }  // namespace
 
 struct SessionWriter::Impl {
+  // Written, but without a row yet. It becomes durable with commit().
+  struct Pending {
+    SessionFrame frame;
+    bool durable = false;  // its file is already
+  };
+
   fs::path folder;
   SessionHeader header;
   Options options;
+  std::mutex pending_mutex;
+  std::vector<Pending> pending;
+  std::vector<FrameGap> pending_gaps;
+  std::int64_t next_id = 0;  // the appending thread's own
+  std::mutex index_mutex;
   std::optional<SqliteDatabase> index;
-  std::optional<SqliteStatement> insert;  // after the index, so that it goes first
-  std::vector<fs::path> not_durable;
-  std::int64_t next_id = 0;
+  std::int64_t committed = 0;
 
   void begin();
+  void write_document(const std::string& key, const nlohmann::json&);
+  void insert(const std::vector<Pending>&, const std::vector<FrameGap>&);
 };
 
 void SessionWriter::Impl::begin() {
@@ -91,17 +116,38 @@ void SessionWriter::Impl::begin() {
   // FULL: a commit is on the disk when it returns, so a row is never lost after append() has told of it.
   index->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; BEGIN");
   index->run(schema);
-  SqliteStatement write_meta(*index, "INSERT INTO meta (key, json) VALUES (?, ?)");
-  for (const auto& [key, document] : session_header_to_json(header)) {
-    write_meta.bind(1, key).bind(2, document.dump()).step();
-    write_meta.reset();
-  }
+  for (const auto& [key, document] : session_header_to_json(header)) write_document(key, document);
   index->run("COMMIT");
-  insert.emplace(*index,
-                 "INSERT INTO frames (id, role, name, exposure_s, nd_density, time_s, file, bytes, crc32) "
-                 "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
   sync_path(folder);
-  if (!options.durable_each) index->run("BEGIN");
+}
+
+void SessionWriter::Impl::write_document(const std::string& key, const nlohmann::json& document) {
+  SqliteStatement write(*index, "INSERT OR REPLACE INTO meta (key, json) VALUES (?, ?)");
+  write.bind(1, key).bind(2, document.dump()).step();
+}
+
+// One transaction: all rows or none.
+void SessionWriter::Impl::insert(const std::vector<Pending>& frames, const std::vector<FrameGap>& gaps) {
+  SqliteStatement frame_row(*index,
+                            "INSERT INTO frames (id, role, name, exposure_s, nd_density, time_s, file, bytes, crc32) "
+                            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  SqliteStatement arrival_row(*index, "INSERT INTO arrivals VALUES (?, ?, ?, ?, ?)");
+  SqliteStatement gap_row(*index, "INSERT INTO gaps VALUES (?, ?, ?, ?)");
+  for (const auto& [frame, durable] : frames) {
+    frame_row.bind(1, frame.id).bind(2, std::string(frame_role_name(frame.info.role))).bind(3, frame.info.name);
+    frame_row.bind(4, frame.info.exposure_s).bind(5, frame.info.nd_density).bind(6, frame.info.time_s);
+    frame_row.bind(7, frame.file).bind(8, frame.bytes).bind(9, std::int64_t{frame.crc32}).step();
+    frame_row.reset();
+    if (!frame.arrival) continue;
+    const FrameArrival& arrival = *frame.arrival;
+    arrival_row.bind(1, frame.id).bind(2, arrival.device_frame).bind(3, arrival.device_ns);
+    arrival_row.bind(4, arrival.monotonic_ns).bind(5, arrival.realtime_ns).step();
+    arrival_row.reset();
+  }
+  for (const FrameGap& gap : gaps) {
+    gap_row.bind(1, gap.next_id).bind(2, gap.missing).bind(3, gap.monotonic_ns).bind(4, gap.reason).step();
+    gap_row.reset();
+  }
 }
 
 SessionWriter::SessionWriter(const fs::path& folder, const SessionHeader& header, const Options& options)
@@ -124,48 +170,80 @@ SessionWriter::SessionWriter(const fs::path& folder, const SessionHeader& header
 SessionWriter::SessionWriter(SessionWriter&&) noexcept = default;
 SessionWriter::~SessionWriter() = default;
 
-EncodedFrame SessionWriter::encode(const Frame& frame) const {
+EncodedFrame SessionWriter::encode(const Frame& frame, TiffCompression compression) const {
   const SessionHeader& header = impl_->header;
   check(std::holds_alternative<ImageF>(frame.pixels) == header.format.linear_float, "frame has the session's type");
   check(channels_of(frame.pixels) == header.format.stored_channels(), "frame has the session's channels");
   check(width_of(frame.pixels) == header.width && height_of(frame.pixels) == header.height,
         "frame has the session's size");
-  return {frame.info, encode_tiff(frame.pixels)};
+  return {frame.info, encode_tiff(frame.pixels, compression), std::nullopt};
 }
 
 std::int64_t SessionWriter::append(const EncodedFrame& frame) {
   check(impl_->index.has_value(), "nothing is appended to a finished session");
   check(std::isfinite(frame.info.exposure_s) && frame.info.exposure_s > 0, "a frame's exposure is positive");
-  const std::int64_t id = impl_->next_id;
-  const std::string file = fmt::format("frames/{:06}.tif", id);
-  const fs::path path = impl_->folder / file;
-  write_whole_file(path, frame.tiff, impl_->options.durable_each);
+  const bool each = impl_->options.durability == Durability::each;
+  SessionFrame row;
+  row.id = impl_->next_id;
+  row.info = frame.info;
+  row.arrival = frame.arrival;
+  row.file = fmt::format("frames/{:06}.tif", row.id);
+  row.bytes = static_cast<std::int64_t>(frame.tiff.size());
+  row.crc32 = crc32(frame.tiff);
+  write_whole_file(impl_->folder / row.file, frame.tiff, each);
+  {
+    const std::lock_guard lock(impl_->pending_mutex);
+    impl_->pending.push_back({row, each});
+  }
+  if (each) commit();
+  return impl_->next_id++;
+}
+
+void SessionWriter::append(const FrameGap& gap) {
+  const std::lock_guard lock(impl_->pending_mutex);
+  impl_->pending_gaps.push_back(gap);
+}
+
+std::int64_t SessionWriter::commit() {
+  const std::lock_guard index_lock(impl_->index_mutex);
+  check(impl_->index.has_value(), "nothing is committed to a finished session");
+  std::vector<Impl::Pending> frames;
+  std::vector<FrameGap> gaps;
+  {
+    const std::lock_guard lock(impl_->pending_mutex);
+    frames = std::exchange(impl_->pending, {});
+    gaps = std::exchange(impl_->pending_gaps, {});
+  }
+  if (frames.empty() && gaps.empty()) return impl_->committed;
+  bool names_are_new = false;
+  for (const Impl::Pending& p : frames) {
+    if (p.durable) continue;
+    sync_path(impl_->folder / p.frame.file);
+    names_are_new = true;
+  }
+  if (names_are_new) sync_path(impl_->folder / "frames");
+  impl_->index->run("BEGIN");
   try {
-    SqliteStatement& insert = *impl_->insert;
-    insert.reset();
-    insert.bind(1, id).bind(2, std::string(frame_role_name(frame.info.role))).bind(3, frame.info.name);
-    insert.bind(4, frame.info.exposure_s).bind(5, frame.info.nd_density).bind(6, frame.info.time_s);
-    insert.bind(7, file).bind(8, static_cast<std::int64_t>(frame.tiff.size()));
-    insert.bind(9, std::int64_t{crc32(frame.tiff)});
-    insert.step();
-    insert.reset();  // ends the implicit transaction
+    impl_->insert(frames, gaps);
+    impl_->index->run("COMMIT");
   } catch (...) {
-    std::error_code ignored;  // a file without a row: the next frame would overwrite it anyway
-    fs::remove(path, ignored);
+    impl_->index->run_quietly("ROLLBACK");
     throw;
   }
-  if (!impl_->options.durable_each) impl_->not_durable.push_back(path);
-  ++impl_->next_id;
-  return id;
+  impl_->committed += static_cast<std::int64_t>(frames.size());
+  return impl_->committed;
+}
+
+void SessionWriter::write_document(const std::string& key, const nlohmann::json& document) {
+  const std::lock_guard lock(impl_->index_mutex);
+  check(impl_->index.has_value(), "nothing is written to a finished session");
+  impl_->write_document(key, document);
 }
 
 void SessionWriter::finish() {
-  check(impl_->index.has_value(), "a session is finished once");
-  for (const fs::path& file : std::exchange(impl_->not_durable, {})) sync_path(file);
-  sync_path(impl_->folder / "frames");
-  impl_->insert.reset();
+  commit();
+  const std::lock_guard lock(impl_->index_mutex);
   SqliteDatabase& index = *impl_->index;
-  if (!impl_->options.durable_each) index.run("COMMIT");
   // A WAL database cannot be opened in a read-only folder; a finished session is one plain file, which can.
   index.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode = DELETE");
   index.close();
@@ -176,11 +254,22 @@ void SessionWriter::finish() {
 struct SessionReader::Impl {
   fs::path folder;
   SessionHeader header;
+  std::map<std::string, nlohmann::json> documents;
   std::vector<SessionFrame> frames;
+  std::vector<FrameGap> gaps;
 
   void read_header(const SqliteDatabase&);
   void read_frames(const SqliteDatabase&);
+  void read_arrivals(const SqliteDatabase&);
+  void read_gaps(const SqliteDatabase&);
 };
+
+// Sessions from before recorders have no arrivals and no gaps.
+bool has_table(const SqliteDatabase& index, const std::string& name) {
+  SqliteStatement statement(index, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?");
+  statement.bind(1, name);
+  return statement.step();
+}
 
 void SessionReader::Impl::read_header(const SqliteDatabase& index) {
   const auto pragma = [&](const char* sql) {
@@ -196,7 +285,6 @@ void SessionReader::Impl::read_header(const SqliteDatabase& index) {
   SqliteStatement verdict(index, "PRAGMA quick_check(1)");
   if (!verdict.step() || verdict.text(0) != "ok")
     throw InputError(index.file(), "", fmt::format("is damaged ({}): restore it from a copy", verdict.text(0)));
-  std::map<std::string, nlohmann::json> documents;
   SqliteStatement rows(index, "SELECT key, json FROM meta");
   while (rows.step()) {
     try {
@@ -225,6 +313,21 @@ void SessionReader::Impl::read_frames(const SqliteDatabase& index) {
   }
 }
 
+void SessionReader::Impl::read_arrivals(const SqliteDatabase& index) {
+  if (!has_table(index, "arrivals")) return;
+  std::map<std::int64_t, FrameArrival> arrivals;
+  SqliteStatement rows(index, "SELECT frame, device_frame, device_ns, monotonic_ns, realtime_ns FROM arrivals");
+  while (rows.step()) arrivals[rows.integer(0)] = {rows.integer(1), rows.integer(2), rows.integer(3), rows.integer(4)};
+  for (SessionFrame& frame : frames)
+    if (const auto found = arrivals.find(frame.id); found != arrivals.end()) frame.arrival = found->second;
+}
+
+void SessionReader::Impl::read_gaps(const SqliteDatabase& index) {
+  if (!has_table(index, "gaps")) return;
+  SqliteStatement rows(index, "SELECT next_id, missing, monotonic_ns, reason FROM gaps ORDER BY next_id, rowid");
+  while (rows.step()) gaps.push_back({rows.integer(0), rows.integer(1), rows.integer(2), rows.text(3)});
+}
+
 SessionReader::SessionReader(fs::path folder) : impl_(std::make_unique<Impl>()) {
   impl_->folder = std::move(folder);
   const fs::path index_path = index_file(impl_->folder);
@@ -239,6 +342,8 @@ SessionReader::SessionReader(fs::path folder) : impl_(std::make_unique<Impl>()) 
   const SqliteDatabase index(index_path, SqliteDatabase::Mode::read_only);
   impl_->read_header(index);
   impl_->read_frames(index);
+  impl_->read_arrivals(index);
+  impl_->read_gaps(index);
 }
 
 SessionReader::SessionReader(SessionReader&&) noexcept = default;
@@ -252,6 +357,15 @@ const SessionHeader& SessionReader::header() const {
 }
 const std::vector<SessionFrame>& SessionReader::frames() const {
   return impl_->frames;
+}
+
+const std::vector<FrameGap>& SessionReader::gaps() const {
+  return impl_->gaps;
+}
+
+std::optional<nlohmann::json> SessionReader::document(const std::string& key) const {
+  const auto found = impl_->documents.find(key);
+  return found == impl_->documents.end() ? std::nullopt : std::optional(found->second);
 }
 
 std::vector<SessionFrame> SessionReader::frames(FrameRole role) const {

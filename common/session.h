@@ -11,6 +11,7 @@
 
 #include "common/frame.h"
 #include "common/mirror_target.h"
+#include "common/tiff_image.h"
 
 namespace mf {
 
@@ -32,18 +33,36 @@ struct SessionHeader {
   std::optional<Reference> reference;
 };
 
+// When a frame came from a camera, by every clock there is.
+struct FrameArrival {
+  std::int64_t device_frame = 0;  // the camera's own count
+  std::int64_t device_ns = 0;     // the camera's clock
+  std::int64_t monotonic_ns = 0;  // CLOCK_MONOTONIC when it had arrived
+  std::int64_t realtime_ns = 0;   // CLOCK_REALTIME then
+};
+
+// Frames that the camera took, or should have taken, and that the recording does not have.
+struct FrameGap {
+  std::int64_t next_id = 0;       // the frame that was recorded first after it
+  std::int64_t missing = 0;       // frames; 0 when nobody can tell
+  std::int64_t monotonic_ns = 0;  // when it was noticed
+  std::string reason;             // one line
+};
+
 struct SessionFrame {
   std::int64_t id = 0;  // in the order of recording
   FrameInfo info;
-  std::string file;         // below the session's folder
-  std::int64_t bytes = 0;   // the file's size
-  std::uint32_t crc32 = 0;  // the file's CRC-32, so that damage is never read as light
+  std::optional<FrameArrival> arrival;  // nothing for imported frames
+  std::string file;                     // below the session's folder
+  std::int64_t bytes = 0;               // the file's size
+  std::uint32_t crc32 = 0;              // the file's CRC-32, so that damage is never read as light
 };
 
 // A frame as its file holds it: what costs time (compression) is done, what is left is writing.
 struct EncodedFrame {
   FrameInfo info;
   std::string tiff;
+  std::optional<FrameArrival> arrival;
 };
 
 // A recording on disk: `session.db` (SQLite, WAL) and `frames/NNNNNN.tif` (16-bit TIFF, or 32-bit float for linear
@@ -52,19 +71,28 @@ struct EncodedFrame {
 // The one writer. Throws InputError naming the file: the folder exists already, disk full, no permission.
 class SessionWriter {
  public:
-  // When durable_each is false, frames become durable together, at finish() (an import can be repeated).
+  enum class Durability {
+    each,     // when append() returns, the frame is durable and has its row
+    batches,  // when commit() or finish() returns, all frames appended before it are durable and have their rows
+  };
   struct Options {
-    bool durable_each = true;
+    Durability durability = Durability::each;
   };
   SessionWriter(const std::filesystem::path& folder, const SessionHeader&, const Options&);
   SessionWriter(SessionWriter&&) noexcept;
   ~SessionWriter();
 
   // Precondition: format and size as in the header. Safe to call from many threads at once, and beside append().
-  [[nodiscard]] EncodedFrame encode(const Frame&) const;
+  [[nodiscard]] EncodedFrame encode(const Frame&, TiffCompression = TiffCompression::deflate) const;
   // Returns the frame's id: 0, 1, 2 ... Names are unique in a role.
   std::int64_t append(const EncodedFrame&);
   std::int64_t append(const Frame& frame) { return append(encode(frame)); }
+  // May run in a thread of its own beside append(). Returns how many frames the session has durably, in all.
+  std::int64_t commit();
+  // Durable with the frames appended before it.
+  void append(const FrameGap&);
+  // A document beside the header's, durable at once: what the camera said of itself, say. Replaces one of this key.
+  void write_document(const std::string& key, const nlohmann::json&);
   // Everything durable, the index closed and a single file. A session without it is still readable up to its last
   // durable row. Nothing may be appended afterwards.
   void finish();
@@ -86,6 +114,9 @@ class SessionReader {
   [[nodiscard]] const SessionHeader& header() const;
   [[nodiscard]] const std::vector<SessionFrame>& frames() const;    // all, by id
   [[nodiscard]] std::vector<SessionFrame> frames(FrameRole) const;  // of one role, by id
+  [[nodiscard]] const std::vector<FrameGap>& gaps() const;          // by next_id
+  // What write_document() wrote; nothing when there is no such document.
+  [[nodiscard]] std::optional<nlohmann::json> document(const std::string& key) const;
   // Throws InputError naming the file when it is missing, truncated, damaged or of another size.
   [[nodiscard]] Frame read_frame(const SessionFrame&) const;
 

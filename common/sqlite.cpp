@@ -43,6 +43,10 @@ void SqliteDatabase::run(const char* sql) {
   if (code != SQLITE_OK) fail(code);
 }
 
+void SqliteDatabase::run_quietly(const char* sql) noexcept {
+  sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr);
+}
+
 void SqliteDatabase::close() {
   const int code = sqlite3_close(handle_.get());
   if (code != SQLITE_OK) fail(code);

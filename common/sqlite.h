@@ -17,7 +17,8 @@ class SqliteDatabase {
   enum class Mode { create, read_only };
   SqliteDatabase(const std::filesystem::path& file, Mode);
 
-  void run(const char* sql);  // statements without results
+  void run(const char* sql);                   // statements without results
+  void run_quietly(const char* sql) noexcept;  // the same, on the way out of a failure
   // Closes; the destructor does the same, but silently.
   void close();
 

@@ -224,7 +224,7 @@ Image<Pixel> read_blocks(TIFF* tiff, const Layout& layout, const MemoryFile& mem
 }
 
 template <typename Pixel>
-std::string encode(const Image<Pixel>& image) {
+std::string encode(const Image<Pixel>& image, TiffCompression compression) {
   check(image.channels == 1 || image.channels == 3, "a TIFF has one or three channels");
   constexpr bool is_float = std::is_same_v<Pixel, float>;
   MemoryFile memory;
@@ -243,9 +243,13 @@ std::string encode(const Image<Pixel>& image) {
   TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, image.channels == 3 ? PHOTOMETRIC_RGB : PHOTOMETRIC_MINISBLACK);
   TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
   TIFFSetField(tiff, TIFFTAG_ORIENTATION, ORIENTATION_TOPLEFT);
-  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-  TIFFSetField(tiff, TIFFTAG_PREDICTOR, is_float ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
-  TIFFSetField(tiff, TIFFTAG_ZIPQUALITY, fastest_deflate);
+  if (compression == TiffCompression::deflate) {
+    TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+    TIFFSetField(tiff, TIFFTAG_PREDICTOR, is_float ? PREDICTOR_FLOATINGPOINT : PREDICTOR_HORIZONTAL);
+    TIFFSetField(tiff, TIFFTAG_ZIPQUALITY, fastest_deflate);
+  } else {
+    TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+  }
   TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, rows_per_strip);
   for (std::uint32_t y = 0, strip = 0; y < height; y += rows_per_strip, ++strip) {
     const std::uint32_t rows = std::min(rows_per_strip, height - y);
@@ -273,8 +277,8 @@ StoredImage decode_tiff(std::string_view bytes, const std::string& file) {
   return {read_blocks<std::uint16_t, std::uint16_t>(tiff.get(), layout, memory, file), layout.bits};
 }
 
-std::string encode_tiff(const FramePixels& pixels) {
-  return std::visit([](const auto& image) { return encode(image); }, pixels);
+std::string encode_tiff(const FramePixels& pixels, TiffCompression compression) {
+  return std::visit([&](const auto& image) { return encode(image, compression); }, pixels);
 }
 
 }  // namespace mf

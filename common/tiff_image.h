@@ -19,7 +19,9 @@ struct StoredImage {
 // scaled and no gamma applied. Throws InputError naming `file` for anything else, and for damaged or truncated data.
 [[nodiscard]] StoredImage decode_tiff(std::string_view bytes, const std::string& file);
 
-// 16-bit codes (predictor 2) or 32-bit float (predictor 3), deflate. One or three channels.
-[[nodiscard]] std::string encode_tiff(const FramePixels&);
+enum class TiffCompression { deflate, none };
+
+// 16-bit codes (predictor 2) or 32-bit float (predictor 3), deflate or as they are. One or three channels.
+[[nodiscard]] std::string encode_tiff(const FramePixels&, TiffCompression = TiffCompression::deflate);
 
 }  // namespace mf

@@ -104,7 +104,7 @@ ImportResult import_session(const ImportInput& input, const ImportOptions& optio
   require_reference_inside(recording.header, input.folder / "reference.json");
   {
     // An import can be repeated, so frames become durable together, which is faster than one by one.
-    SessionWriter writer(folder.path(), recording.header, {.durable_each = false});
+    SessionWriter writer(folder.path(), recording.header, {SessionWriter::Durability::batches});
     copy_frames(recording, writer, progress);
     writer.finish();
   }

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <fstream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <thread>
 
 #include "common/file_bytes.h"
@@ -46,8 +47,8 @@ Frame frame_of(const PixelFormat& format, int i, FrameRole role = FrameRole::mir
   return {info, test::random_pixels(format, width, height, static_cast<unsigned>(i))};
 }
 
-void write_session(const fs::path& folder, const PixelFormat& format, int frames, bool durable_each = true) {
-  SessionWriter writer(folder, header_of(format), {.durable_each = durable_each});
+void write_session(const fs::path& folder, const PixelFormat& format, int frames, SessionWriter::Durability durability = SessionWriter::Durability::each) {
+  SessionWriter writer(folder, header_of(format), {durability});
   for (int i = 0; i < frames; ++i) EXPECT_EQ(writer.append(frame_of(format, i)), i);
   writer.finish();
 }
@@ -64,9 +65,9 @@ class EveryFormat : public testing::TestWithParam<const char*> {};
 TEST_P(EveryFormat, RoundTripsBitForBit) {
   const test::TemporaryFolder folder;
   const PixelFormat format = parse_pixel_format(GetParam()).value();
-  for (const bool durable_each : {true, false}) {
-    const fs::path session = folder / (durable_each ? "a" : "b");
-    write_session(session, format, 3, durable_each);
+  for (const auto durability : {SessionWriter::Durability::each, SessionWriter::Durability::batches}) {
+    const fs::path session = folder / (durability == SessionWriter::Durability::each ? "a" : "b");
+    write_session(session, format, 3, durability);
     const SessionReader reader(session);
     EXPECT_EQ(reader.header().format, format);
     ASSERT_EQ(reader.frames().size(), 3U);
@@ -198,13 +199,44 @@ TEST(Session, AKilledWriterLosesNothingThatItHadTold) {
         test::same_pixels(reader.read_frame(reader.frames()[i]).pixels, frame_of({}, static_cast<int>(i)).pixels));
 }
 
-TEST(Session, WithoutDurableEachNoFrameIsListedBeforeFinish) {
+TEST(Session, InBatchesNoFrameIsListedBeforeItsCommit) {
   const test::TemporaryFolder folder;
-  SessionWriter writer(folder / "s", header_of({}), {.durable_each = false});
+  SessionWriter writer(folder / "s", header_of({}), {SessionWriter::Durability::batches});
   writer.append(frame_of({}, 0));
   EXPECT_TRUE(SessionReader(folder / "s").frames().empty());
-  writer.finish();
+  EXPECT_EQ(writer.commit(), 1);
   EXPECT_EQ(SessionReader(folder / "s").frames().size(), 1U);
+  writer.append(frame_of({}, 1));
+  writer.finish();
+  EXPECT_EQ(SessionReader(folder / "s").frames().size(), 2U);
+}
+
+TEST(Session, ArrivalsGapsAndDocumentsComeBack) {
+  const test::TemporaryFolder folder;
+  SessionWriter writer(folder / "s", header_of({}), {SessionWriter::Durability::batches});
+  EncodedFrame first = writer.encode(frame_of({}, 0), TiffCompression::none);
+  first.arrival = FrameArrival{7, 70, 700, 7000};
+  writer.append(first);
+  writer.append(FrameGap{1, 3, 800, "packets were lost"});
+  writer.append(frame_of({}, 1));
+  writer.write_document("device", {{"model", "a"}});
+  writer.write_document("device", {{"model", "b"}});
+  writer.finish();
+  const SessionReader reader(folder / "s");
+  ASSERT_EQ(reader.frames().size(), 2U);
+  ASSERT_TRUE(reader.frames()[0].arrival.has_value());
+  EXPECT_EQ(reader.frames()[0].arrival->device_frame, 7);
+  EXPECT_EQ(reader.frames()[0].arrival->device_ns, 70);
+  EXPECT_EQ(reader.frames()[0].arrival->monotonic_ns, 700);
+  EXPECT_EQ(reader.frames()[0].arrival->realtime_ns, 7000);
+  EXPECT_FALSE(reader.frames()[1].arrival.has_value());
+  EXPECT_TRUE(test::same_pixels(reader.read_frame(reader.frames()[0]).pixels, frame_of({}, 0).pixels));
+  ASSERT_EQ(reader.gaps().size(), 1U);
+  EXPECT_EQ(reader.gaps()[0].next_id, 1);
+  EXPECT_EQ(reader.gaps()[0].missing, 3);
+  EXPECT_EQ(reader.gaps()[0].reason, "packets were lost");
+  EXPECT_EQ(reader.document("device").value()["model"], "b");
+  EXPECT_FALSE(reader.document("none").has_value());
 }
 
 TEST(Session, AnExistingFolderIsRefusedAndKept) {

@@ -129,7 +129,7 @@ const std::vector<FolderRule>& include_table() {
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},
        stage_libraries + Names{"GoogleTest", "benchmark", "OpenCV", "Ceres", "SQLite", "TIFF", "PNG", "OpenEXR",
-                               "Imath", "AprilTag", "Embree", "assimp", "GL"}},
+                               "Imath", "AprilTag", "Embree", "assimp", "GL", "Aravis"}},
   };
   return table;
 }

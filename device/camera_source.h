@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <optional>
+#include <string>
+
+#include "common/frame.h"
+#include "common/image.h"
+#include "common/session.h"
+
+namespace mf {
+
+// What the operator asks of a camera. What is left open stays as the camera has it.
+struct CameraSettings {
+  std::string address;  // IP address, or the name that `mirrorfieldd --list` shows; empty: the first camera found
+  std::optional<std::string> pixel_format;      // as the camera names it: BayerRG12, Mono12p ...
+  std::optional<std::array<int, 4>> region_px;  // x, y, width, height
+  std::optional<double> exposure_s;
+  std::optional<double> gain_db;
+  std::optional<double> frame_rate_hz;
+  int packet_bytes = 1400;                     // GigE: fits every network; 8000 where jumbo frames pass
+  int socket_buffer_bytes = 16 * 1024 * 1024;  // GigE: net.core.rmem_max must allow it
+};
+
+// What the camera is and how it is set, all of it read back.
+struct CameraDescription {
+  std::string vendor, model, serial;
+  PixelFormat format;
+  std::string wire_format;  // the pixel format's name on the wire
+  int width = 0, height = 0;
+  double exposure_s = 0;
+  double gain_db = 0;
+  double frame_rate_hz = 0;  // 0: unknown
+  std::string genicam_xml;   // empty when there is none
+};
+
+struct CameraFrame {
+  ImageU16 codes;  // of the description's size; the caller allocates once, and again and again uses the same
+  FrameArrival arrival;
+};
+
+enum class Received {
+  frame,       // complete
+  incomplete,  // the camera took it, but parts were lost on the way: arrival is set, codes are not
+  nothing,     // within the time allowed
+  lost,        // the camera is gone: destroy this source and open another
+};
+
+// The hardware seam: one open camera that takes frames by itself. Everything throws InputError naming the camera and
+// what to do. One thread at a time.
+class CameraSource {
+ public:
+  CameraSource() = default;
+  CameraSource(const CameraSource&) = delete;
+  CameraSource& operator=(const CameraSource&) = delete;
+  virtual ~CameraSource() = default;
+
+  [[nodiscard]] virtual const CameraDescription& description() const = 0;
+  virtual void start() = 0;
+  [[nodiscard]] virtual Received receive(CameraFrame& into, std::chrono::milliseconds at_most) = 0;
+};
+
+}  // namespace mf

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "device/camera_source.h"
+#include "device/recorder.h"
+
+namespace mf {
+
+// mirrorfieldd.toml (docs/rig.md): what the rig is and how it records.
+struct DeviceConfig {
+  CameraSettings camera;
+  std::filesystem::path target;                // target.json of the mirror in use
+  std::optional<std::filesystem::path> world;  // world.json of the scene's tags
+  double mirror_reflectance = 1;               // (0, 1]
+  double black_level_hint = 0;                 // code
+  std::filesystem::path recordings;            // sessions are made below it
+  RecorderOptions recorder;
+};
+
+// Throws InputError naming the file and the key: no TOML, an unknown key, a wrong type or range, a missing one.
+// Relative paths are relative to the file's folder.
+[[nodiscard]] DeviceConfig read_device_config(const std::filesystem::path&);
+
+}  // namespace mf
