@@ -47,7 +47,8 @@ Frame frame_of(const PixelFormat& format, int i, FrameRole role = FrameRole::mir
   return {info, test::random_pixels(format, width, height, static_cast<unsigned>(i))};
 }
 
-void write_session(const fs::path& folder, const PixelFormat& format, int frames, SessionWriter::Durability durability = SessionWriter::Durability::each) {
+void write_session(const fs::path& folder, const PixelFormat& format, int frames,
+                   SessionWriter::Durability durability = SessionWriter::Durability::each) {
   SessionWriter writer(folder, header_of(format), {durability});
   for (int i = 0; i < frames; ++i) EXPECT_EQ(writer.append(frame_of(format, i)), i);
   writer.finish();
