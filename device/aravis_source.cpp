@@ -159,9 +159,11 @@ void AravisSource::open_stream(const CameraSettings& settings) {
   stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, failure));
   failure.raise_if_any("another program may have the camera");
   if (stream_ == nullptr) throw InputError(name_, "", "gives no stream: another program may have the camera");
+  constexpr unsigned frame_retention_us = 500'000;  // for packets that are asked for again on a busy board
   if (ARV_IS_GV_STREAM(stream_.get()))
     g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-                 settings.socket_buffer_bytes, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_ALWAYS, nullptr);
+                 settings.socket_buffer_bytes, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_ALWAYS, "frame-retention",
+                 frame_retention_us, nullptr);
   const std::size_t payload = arv_camera_get_payload(camera_.get(), failure);
   failure.raise_if_any("the camera does not tell the size of its frames");
   constexpr int stream_buffers = 24;  // two thirds of a second at 37 frames a second

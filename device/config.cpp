@@ -36,7 +36,7 @@ class Table {
   [[nodiscard]] std::optional<T> find(const std::string& key, const char* kind) {
     known_.insert(key);
     if (table_ == nullptr || !table_->contains(key)) return std::nullopt;
-    const std::optional<T> value = (*table_)[key].value<T>();
+    std::optional<T> value = (*table_)[key].value<T>();
     if (!value) fail(key, fmt::format("must be {}", kind));
     return value;
   }

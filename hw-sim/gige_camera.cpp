@@ -33,8 +33,10 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint16_t gvcp_port = 3956;
 constexpr std::uint8_t gvcp_key = 0x42;
-constexpr std::size_t gvsp_overhead = 36;  // IP, UDP and GVSP headers, which the packet size counts too
-constexpr std::size_t kept_blocks = 32;    // for resending: most of a second
+constexpr std::size_t gvsp_overhead = 36;              // IP, UDP and GVSP headers, which the packet size counts too
+constexpr std::size_t wire_bytes_per_s = 118'000'000;  // gigabit Ethernet
+constexpr std::uint32_t packets_in_a_row = 32;
+constexpr std::size_t kept_blocks = 32;  // for resending: most of a second
 
 enum Command : std::uint16_t {  // GVCP, §16
   discovery = 0x0002,
@@ -355,7 +357,10 @@ void GigeCamera::Impl::send_frames() {
   std::uniform_real_distribution<double> chance;
   Clock::time_point next_at = Clock::now();
   while (true) {
-    changed.wait(lock, [&] { return ending || streaming(); });
+    if (!ending && !streaming()) {
+      changed.wait(lock, [&] { return ending || streaming(); });
+      next_at = Clock::now();
+    }
     if (ending) return;
     next_at = std::max(next_at + std::chrono::duration_cast<Clock::duration>(
                                      std::chrono::duration<double>(1 / registers.real(gige::frame_rate_hz))),
@@ -379,6 +384,7 @@ void GigeCamera::Impl::send_frames() {
     if (recent.size() > kept_blocks) recent.pop_front();
     ++counts.frames;
     const Block sent = recent.back();
+    const Clock::time_point begun = Clock::now();
     for (std::uint32_t packet = 0; packet <= sent.data_packets() + 1 && streaming(); ++packet) {
       ++counts.packets;
       if (chance(losses) < options.packet_loss) {
@@ -387,6 +393,10 @@ void GigeCamera::Impl::send_frames() {
       }
       lock.unlock();
       stream.send(packet_of(sent, packet), destination);
+      // No faster than the wire that a camera has: a burst would overflow buffers that hold on location.
+      if (packet % packets_in_a_row == 0)
+        std::this_thread::sleep_until(begun + std::chrono::nanoseconds(packet * (sent.data_per_packet + gvsp_overhead) *
+                                                                       1'000'000'000 / wire_bytes_per_s));
       lock.lock();
     }
   }

@@ -36,7 +36,8 @@ struct GigeCameraCounts {
 // keeps what a client sets in readable registers. One client has control at a time; when its heartbeat stops, control
 // ends and so does the stream.
 //
-// Left out: chunk data, extended block numbers, message channels, multicast, action commands.
+// Packets leave at gigabit speed. Left out: chunk data, extended block numbers, message channels, multicast, action
+// commands.
 class GigeCamera {
  public:
   // Fills frame `number` (from 1) as format.bytes_for(width · height) bytes; runs in the streaming thread.

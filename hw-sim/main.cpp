@@ -5,9 +5,12 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <thread>
 
 #include "common/command_line/command_line.h"
+#include "common/error.h"
 #include "hw-sim/capture.h"
+#include "hw-sim/session_camera.h"
 
 namespace {
 
@@ -24,21 +27,73 @@ void simulate(const std::filesystem::path& out, const mf::sim::CaptureOptions& o
              options.size, elapsed.count());
 }
 
+struct CameraArguments {
+  std::filesystem::path session;
+  mf::sim::PlayOptions play;
+  double linger_s = 2;
+};
+
+void check_camera(const CameraArguments& a) {
+  const mf::sim::GigeCameraOptions& o = a.play.camera;
+  if (!(o.frame_rate_hz > 0 && o.frame_rate_hz <= 1000))
+    throw mf::InputError("camera", "--rate", "must lie above 0, up to 1000");
+  if (!(o.packet_loss >= 0 && o.packet_loss < 1))
+    throw mf::InputError("camera", "--loss", "must lie from 0 to below 1");
+  if (a.play.times < 0) throw mf::InputError("camera", "--times", "must not be negative");
+}
+
+// Answers until everything was sent and could be asked for again, or for ever.
+void play(const CameraArguments& a) {
+  const mf::sim::SessionCamera camera(a.session, a.play);
+  const mf::sim::GigeCameraOptions& o = camera.options();
+  fmt::print("{}: {} x {} {} at {} frames a second, waiting for a client\n", o.address, o.width, o.height,
+             o.format.name, o.frame_rate_hz);
+  std::fflush(stdout);
+  while (!camera.finished()) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  std::this_thread::sleep_for(std::chrono::duration<double>(a.linger_s));
+  const mf::sim::GigeCameraCounts c = camera.counts();
+  fmt::print("{} frames in {} packets, {} of them dropped; {} sent again\n", c.frames, c.packets, c.dropped, c.resent);
+}
+
+void add_capture_command(mf::CommandLine& program, mf::sim::CaptureOptions& options, std::filesystem::path& out) {
+  mf::CommandLine command = program.command(
+      "capture",
+      "ray trace a mirror capture and write it, truth included, in the format that `mirrorfield import` reads");
+  command.option("-o,--out", out, "folder to create", mf::Presence::required);
+  command.option("--frames", options.frames, "frames of the waving mirror");
+  command.option("--size", options.size, "edge of a frame, pixels");
+  command.option("--seed", options.seed, "same seed, same bytes");
+  command.option("--samples", options.samples, "light paths a pixel in frames");
+  command.option("--truth-samples", options.truth_samples, "light paths a pixel in truth pictures");
+  command.option("--views", options.views, "truth pictures with and without the object");
+  command.on_run([&] { simulate(out, options); });
+}
+
+void add_camera_command(mf::CommandLine& program, CameraArguments& a) {
+  mf::CommandLine command = program.command("camera", "play a session's mirror frames as a GigE Vision camera");
+  command.option("session", a.session, "session whose frames are sent", mf::Presence::required);
+  command.option("--address", a.play.camera.address,
+                 "of this machine: a loopback address keeps every packet on this machine");
+  command.option("--rate", a.play.camera.frame_rate_hz, "frames a second");
+  command.option("--loss", a.play.camera.packet_loss, "share of the packets that get lost at first, 0 to below 1");
+  command.option("--seed", a.play.camera.seed, "of the losses");
+  command.option("--times", a.play.times, "how often the recording is played; 0: for ever");
+  command.option("--linger", a.linger_s, "seconds in which it answers after the last frame");
+  command.on_run([&a] {
+    check_camera(a);
+    play(a);
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   mf::CommandLine program("mirrorfield-sim",
-                          "Simulates a mirror capture by ray tracing and writes it, truth included, in the format that "
-                          "`mirrorfield import` reads.");
+                          "The rig without hardware: captures by ray tracing, and a camera that plays them.");
   mf::sim::CaptureOptions options;
   std::filesystem::path out;
-  program.option("-o,--out", out, "folder to create", mf::Presence::required);
-  program.option("--frames", options.frames, "frames of the waving mirror");
-  program.option("--size", options.size, "edge of a frame, pixels");
-  program.option("--seed", options.seed, "same seed, same bytes");
-  program.option("--samples", options.samples, "light paths a pixel in frames");
-  program.option("--truth-samples", options.truth_samples, "light paths a pixel in truth pictures");
-  program.option("--views", options.views, "truth pictures with and without the object");
-  program.on_run([&] { simulate(out, options); });
+  CameraArguments camera;
+  add_capture_command(program, options, out);
+  add_camera_command(program, camera);
   return program.run(argc, argv);
 }

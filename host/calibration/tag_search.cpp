@@ -35,6 +35,7 @@ std::optional<TagCorners> predict(const std::vector<TagSighting>& found,
                                   const std::array<Eigen::Vector3d, 4>& corners) {
   constexpr std::size_t neighbours = 6;
   std::vector<const TagSighting*> near;
+  near.reserve(found.size());
   for (const TagSighting& tag : found) near.push_back(&tag);
   const Eigen::Vector2d at = centre(corners);
   std::sort(near.begin(), near.end(), [&](const TagSighting* a, const TagSighting* b) {

@@ -55,7 +55,7 @@ TEST(Process, FromASimulatedRecordingToALitPicture) {
   const std::string session = folder / "session";
   const std::string out = folder / "out";
   const std::string truth = capture + "/truth";
-  ASSERT_EQ(run_command({simulator, "-o", capture, "--frames", "50", "--size", "384", "--samples", "4",
+  ASSERT_EQ(run_command({simulator, "capture", "-o", capture, "--frames", "50", "--size", "384", "--samples", "4",
                          "--truth-samples", "16"})
                 .exit_code,
             0);
