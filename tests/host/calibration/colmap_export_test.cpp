@@ -58,7 +58,7 @@ TEST(ExportColmap, PutsWorldPointsWhereTheMirrorShowsThem) {
   header.target = framed_mirror();
   ImageU16 pixels(header.width, header.height, 1, 100);
   pixels.at(700, 20) = 200;
-  SessionWriter writer(folder / "S", header, {false});
+  SessionWriter writer(folder / "S", header, {SessionWriter::Durability::batches});
   const auto append = [&](const char* name, FrameRole role) {
     Frame frame;
     frame.info.name = name;

@@ -22,7 +22,7 @@ class ReportPage : public testing::Test {
     header.target.family = "tag36h11";
     header.target.opening_m = {0.2, 0.1};
     header.target.tags = {{0, 0.02, {0.13, 0}}};
-    SessionWriter writer(folder_, header, {false});
+    SessionWriter writer(folder_, header, {SessionWriter::Durability::batches});
     for (const char* name : {"a.png", "b<script>.png"}) {
       Frame frame;
       frame.info.name = name;
