@@ -30,19 +30,27 @@ test::Script script_of(int frames, int period_ms, std::set<int> skipped = {}, st
   return script;
 }
 
-CaptureResult record(const std::filesystem::path& session, const test::Script& script, double seconds,
-                     const CaptureOptions& options = {}) {
+// Until the camera has given all its frames.
+CaptureResult record(const std::filesystem::path& session, const test::Script& script) {
   const auto shared = std::make_shared<test::ScriptRun>(script);
-  const std::atomic<bool> stop = false;
-  CaptureOptions chosen = options;
-  chosen.most_seconds = seconds;
-  return capture([=] { return std::make_unique<ScriptedCamera>(shared); }, session, test::header_with_target(), chosen,
-                 stop);
+  CaptureOptions options;
+  options.reopen_each = milliseconds(20);
+  options.most_seconds = 60;
+  return capture([=] { return std::make_unique<ScriptedCamera>(shared); }, session, test::header_with_target(), options,
+                 shared->done);
+}
+
+void wait_for_frames(const std::filesystem::path& session, std::size_t count) {
+  for (int i = 0; i < 600; ++i) {
+    std::this_thread::sleep_for(milliseconds(50));
+    if (std::filesystem::exists(session / "frames/000000.tif") && SessionReader(session).frames().size() >= count)
+      return;
+  }
 }
 
 TEST(Recorder, EveryFrameComesBackBitForBitWithItsClocks) {
   const test::TemporaryFolder folder;
-  const CaptureResult result = record(folder / "s", script_of(40, 5), 0.6);
+  const CaptureResult result = record(folder / "s", script_of(40, 5));
   EXPECT_EQ(result.recorder.durable, 40);
   EXPECT_EQ(result.recorder.lost, 0);
   EXPECT_FALSE(result.recorder.failure.has_value());
@@ -60,7 +68,7 @@ TEST(Recorder, EveryFrameComesBackBitForBitWithItsClocks) {
 
 TEST(Recorder, SkippedAndIncompleteFramesAreGaps) {
   const test::TemporaryFolder folder;
-  const CaptureResult result = record(folder / "s", script_of(30, 3, {10, 11, 12}, {20}), 0.5);
+  const CaptureResult result = record(folder / "s", script_of(30, 3, {10, 11, 12}, {20}));
   EXPECT_EQ(result.recorder.durable, 26);
   EXPECT_EQ(result.recorder.lost, 4);
   const SessionReader reader(folder / "s");
@@ -73,12 +81,10 @@ TEST(Recorder, SkippedAndIncompleteFramesAreGaps) {
 
 TEST(Recorder, ALostCameraComesBackIntoTheSameSession) {
   const test::TemporaryFolder folder;
-  CaptureOptions options;
-  options.reopen_each = milliseconds(20);
   test::Script script = script_of(40, 5);
   script.dies_after = 15;
   script.dead_for = milliseconds(100);
-  const CaptureResult result = record(folder / "s", script, 0.8, options);
+  const CaptureResult result = record(folder / "s", script);
   EXPECT_EQ(result.recorder.durable, 40);
   const SessionReader reader(folder / "s");
   ASSERT_EQ(reader.gaps().size(), 1U);
@@ -92,14 +98,14 @@ TEST(Recorder, AKilledProcessLeavesWhatWasDurable) {
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
-    (void)record(folder / "s", script_of(100000, 2), 60);
+    (void)record(folder / "s", script_of(100000, 2));
     _exit(0);
   }
-  std::this_thread::sleep_for(milliseconds(1100));
+  wait_for_frames(folder / "s", 50);
   kill(child, SIGKILL);
   waitpid(child, nullptr, 0);
   const SessionReader reader(folder / "s");
-  ASSERT_GT(reader.frames().size(), 50U);
+  ASSERT_GE(reader.frames().size(), 50U);
   for (const SessionFrame& frame : reader.frames())
     EXPECT_EQ(std::get<ImageU16>(reader.read_frame(frame).pixels).data,
               test::scripted_codes(frame.arrival->device_frame).data);
@@ -108,17 +114,16 @@ TEST(Recorder, AKilledProcessLeavesWhatWasDurable) {
 TEST(Recorder, AnErrorOfTheDiskEndsTheRecordingAndKeepsWhatWasDurable) {
   const test::TemporaryFolder folder;
   std::thread saboteur([&] {
-    std::this_thread::sleep_for(milliseconds(700));
+    wait_for_frames(folder / "s", 50);
     std::filesystem::rename(folder / "s/frames", folder / "s/away");
   });
-  const CaptureResult result = record(folder / "s", script_of(100000, 5), 5);
+  const CaptureResult result = record(folder / "s", script_of(100000, 5));
   saboteur.join();
   ASSERT_TRUE(result.recorder.failure.has_value());
   EXPECT_NE(result.recorder.failure->find("frames/"), std::string::npos) << *result.recorder.failure;
-  EXPECT_LT(result.seconds, 2);
   std::filesystem::rename(folder / "s/away", folder / "s/frames");
   const SessionReader reader(folder / "s");
-  EXPECT_GT(reader.frames().size(), 50U);
+  EXPECT_GE(reader.frames().size(), 50U);
   for (const SessionFrame& frame : reader.frames()) (void)reader.read_frame(frame);
 }
 

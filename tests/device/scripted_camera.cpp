@@ -57,6 +57,7 @@ Received ScriptedCamera::receive(CameraFrame& into, std::chrono::milliseconds at
   }
   while (script.skipped.contains(run.next)) ++run.next;
   if (run.next > script.frames) {
+    run.done = true;
     std::this_thread::sleep_for(at_most);
     return Received::nothing;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <set>
@@ -26,6 +27,7 @@ struct ScriptRun {
   Script script;
   int next = 1;
   bool died = false;
+  std::atomic<bool> done = false;  // all frames were given
   std::chrono::steady_clock::time_point next_at;
   std::chrono::steady_clock::time_point back_at;
 };
