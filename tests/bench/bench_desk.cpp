@@ -37,7 +37,7 @@ class Desk {
 
   // Path of the field; empty on failure.
   [[nodiscard]] std::string field(const std::string& proxy) {
-    const std::string file = folder_ / (proxy + ".lf.exr");
+    std::string file = folder_ / (proxy + ".lf.exr");
     if (fs::exists(file)) return file;
     const bool made = mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions", "2500", "--size",
                                    "128", "--proxy", proxy})

@@ -35,7 +35,8 @@ ImageF photograph(const TagPattern& pattern, const Scene& scene, int size, unsig
     for (int x = 0; x < size; ++x) {
       double white = 0;
       for (int i = 0; i < n * n; ++i) {
-        const Eigen::Vector2d at(x + (i % n + 0.5) / n, y + (i / n + 0.5) / n);
+        const int across = i % n, down = i / n;
+        const Eigen::Vector2d at(x + (across + 0.5) / n, y + (down + 0.5) / n);
         const Eigen::Vector2d uv = tag_from_picture * at;
         const int column = static_cast<int>(std::floor(0.5 * (pattern.border_cells * uv.x() + pattern.cells)));
         const int row = static_cast<int>(std::floor(0.5 * (pattern.cells - pattern.border_cells * uv.y())));

@@ -56,12 +56,11 @@ double relative_rms(const std::vector<Eigen::Vector3f>& a, const std::vector<Eig
 }
 
 std::vector<SurfacePoint> ground_grid(int side, float half) {
+  const auto at = [&](int i) { return half * (2 * (static_cast<float>(i) + 0.5F) / static_cast<float>(side) - 1); };
   std::vector<SurfacePoint> points;
-  for (int i = 0; i < side * side; ++i)
-    points.push_back(
-        test::facing({half * (2 * (static_cast<float>(i % side) + 0.5F) / static_cast<float>(side) - 1),
-                      half * (2 * (static_cast<float>(i / side) + 0.5F) / static_cast<float>(side) - 1), 0},
-                     Eigen::Vector3f::UnitZ()));
+  points.reserve(static_cast<std::size_t>(side * side));
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x) points.push_back(test::facing({at(x), at(y), 0}, Eigen::Vector3f::UnitZ()));
   return points;
 }
 
@@ -124,6 +123,7 @@ TEST_F(Backends, GlCastsASingleShadowWhereItShould) {
   const TriangleMesh mesh = test::rectangle(0, 0, 0.1F, 0.1F, 0.2F);  // its shadow: shifted by (−0.1, −0.05)
   std::vector<SurfacePoint> points;
   const std::vector<float> steps{-0.3F, -0.0505F, -0.0495F, 0.F, 0.0495F, 0.0505F, 0.3F};
+  points.reserve(steps.size());
   for (const float dx : steps) points.push_back(test::facing({-0.1F + dx, -0.05F, 0}, {0, 0, 1}));
   const auto sums = on_gl(mesh, points, lights, LightSum::visible);
   for (std::size_t i = 0; i < steps.size(); ++i)
@@ -134,6 +134,7 @@ TEST_F(Backends, GlReadsTheTileWhereTheRayCrossesThePlane) {
   LightField field = uneven_field(300);
   const LightSet lights = make_light_set(field, {});
   std::vector<SurfacePoint> points;
+  points.reserve(1500);
   for (int i = 0; i < 1500; ++i)  // more than a row of the G-buffer
     points.push_back(test::facing({0.0003F * static_cast<float>(i % 700), 0.1F, 0.0001F * static_cast<float>(i)},
                                   Eigen::Vector3f(0.3F, 0.1F, 1).normalized()));
