@@ -4,6 +4,7 @@
 #include <arv.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <atomic>
 #include <ctime>
 #include <span>
@@ -45,6 +46,15 @@ std::int64_t clock_ns(clockid_t clock) {
   timespec now{};
   clock_gettime(clock, &now);
   return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+// Aravis notes CLOCK_REALTIME when a frame's last packet comes; the frame may have waited since.
+FrameArrival arrival_of(ArvBuffer* buffer) {
+  const std::int64_t realtime_now = clock_ns(CLOCK_REALTIME), monotonic_now = clock_ns(CLOCK_MONOTONIC);
+  const auto noted = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
+  const std::int64_t waited = noted > 0 ? std::max<std::int64_t>(realtime_now - noted, 0) : 0;
+  return {static_cast<std::int64_t>(arv_buffer_get_frame_id(buffer)),
+          static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)), monotonic_now - waited, realtime_now - waited};
 }
 
 std::string text_or_empty(const char* text) {
@@ -196,9 +206,7 @@ Received AravisSource::receive(CameraFrame& into, std::chrono::milliseconds at_m
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(at_most).count();
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(us));
   if (buffer == nullptr) return lost_ ? Received::lost : Received::nothing;
-  into.arrival = {static_cast<std::int64_t>(arv_buffer_get_frame_id(buffer)),
-                  static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)), clock_ns(CLOCK_MONOTONIC),
-                  clock_ns(CLOCK_REALTIME)};
+  into.arrival = arrival_of(buffer);
   const bool complete = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS && unpack_into(buffer, into);
   arv_stream_push_buffer(stream_.get(), buffer);
   return complete ? Received::frame : Received::incomplete;

@@ -43,14 +43,15 @@ class Capture {
   Capture(const OpenCamera& open, const std::filesystem::path& session, SessionHeader header,
           const CaptureOptions& options)
       : open_(open), options_(options), camera_(open()), description_(camera_->description()) {
+    const std::int64_t start_ns = monotonic_ns();
+    camera_->start();  // before there is a session: a camera that does not start leaves none
     header.format = description_.format;
     header.width = description_.width;
     header.height = description_.height;
     SessionWriter writer(session, header, {SessionWriter::Durability::batches});
     writer.write_document("device", document_of(description_));
-    recorder_.emplace(std::move(writer), description_, monotonic_ns(), options.recorder);
+    recorder_.emplace(std::move(writer), description_, start_ns, options.recorder);
     spare_.codes = ImageU16(description_.width, description_.height, 1);
-    camera_->start();
   }
 
   void step();
