@@ -74,7 +74,7 @@ TEST_F(CalibrationJson, NamesTheFieldThatIsWrong) {
     }
     return "accepted";
   };
-  EXPECT_NE(fault("/K/0/0", -5).find("K"), std::string::npos);
+  EXPECT_NE(fault("/K/0/0", -5).find('K'), std::string::npos);
   EXPECT_NE(fault("/width", 0).find("width"), std::string::npos);
   EXPECT_NE(fault("/frames/0/cam_from_mirror/0/0", 3.0).find("a.png: cam_from_mirror"), std::string::npos);
   EXPECT_NE(fault("/frames", "none").find("frames"), std::string::npos);

@@ -31,11 +31,11 @@ TEST(ImportCommand, TheDeskRecordingIsImported) {
   const SessionFrame& frame = reader.frames().at(217);
   EXPECT_EQ(frame.info.name, "00217.png");
   if (test::run_command({"/usr/bin/python3", "-c", "import cv2"}).exit_code != 0) return;
-  const auto same =
-      test::run_command({"/usr/bin/python3", "-c",
-                         "import cv2, sys; a, b = (cv2.imread(f, -1) for f in sys.argv[1:])\n"
-                         "assert a.dtype == b.dtype == 'uint16' and a.shape == b.shape and (a == b).all()",
-                         (folder / ("S/" + frame.file)).string(), (desk / "frames/00217.png").string()});
+  const std::string compare =
+      "import cv2, sys; a, b = (cv2.imread(f, -1) for f in sys.argv[1:])\n"
+      "assert a.dtype == b.dtype == 'uint16' and a.shape == b.shape and (a == b).all()";
+  const auto same = test::run_command({"/usr/bin/python3", "-c", compare, (folder / ("S/" + frame.file)).string(),
+                                       (desk / "frames/00217.png").string()});
   EXPECT_EQ(same.exit_code, 0) << same.err;
 }
 

@@ -10,6 +10,7 @@ namespace {
 
 std::vector<double> wavy() {
   std::vector<double> q;
+  q.reserve(40);
   for (int k = 0; k < 40; ++k) q.push_back(0.1 * std::min(k, 20) + 0.2 * std::sin(0.7 * k));
   return q;
 }
@@ -52,6 +53,7 @@ TEST(CodeSpline, SlopeAndBasisAreTheDerivatives) {
 
 TEST(CodeSpline, EqualStepsOfQAreALinearSensor) {
   std::vector<double> q;
+  q.reserve(60);
   for (int k = 0; k < 60; ++k) q.push_back(0.1 * k);  // q' = 1
   const CodeSpline f(0, 0.1, 10, q);
   const double gain = (f.at(2).value - 10) / std::exp(2);

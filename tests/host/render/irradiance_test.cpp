@@ -85,6 +85,7 @@ TEST(Irradiance, PointsOfManyPacketsKeepTheirOrder) {
   const TriangleMesh mesh = test::rectangle(0, 0, 0.2F, 0.2F, 0.1F);
   const RayScene scene(mesh);
   std::vector<SurfacePoint> points;
+  points.reserve(2500);
   for (int i = 0; i < 2500; ++i)
     points.push_back(test::facing({0.0004F * static_cast<float>(i - 1250), 0, 0}, {0, 0, 1}));
   const auto all = irradiance_cpu(scene, points, lights, LightSum::visible);

@@ -15,7 +15,7 @@ namespace {
 class SceneInput : public testing::Test {
  protected:
   std::filesystem::path write(const std::string& name, const std::string& text) {
-    const std::filesystem::path file = folder_ / name;
+    std::filesystem::path file = folder_ / name;
     std::ofstream(file, std::ios::binary) << text;
     return file;
   }
@@ -124,9 +124,9 @@ TEST_F(SceneInput, BadViewsAreNamed) {
   EXPECT_NE(read(good, -1).find("has no view -1"), std::string::npos);
   EXPECT_NE(read("[{" + pose + "}]", 0).find("[0].K: is missing"), std::string::npos);
   EXPECT_NE(read("[{" + k_matrix + "}]", 0).find("[0].camera_from_world: is missing"), std::string::npos);
-  EXPECT_NE(read("[{" + pose + R"(,"K":[[100,0],[0,100]]}])", 0).find("K"), std::string::npos);
+  EXPECT_NE(read("[{" + pose + R"(,"K":[[100,0],[0,100]]}])", 0).find('K'), std::string::npos);
   EXPECT_NE(read("[{" + pose + R"(,"K":[[-1,0,32],[0,100,24],[0,0,1]]}])", 0).find("focal"), std::string::npos);
-  EXPECT_NE(read("[{" + pose + R"(,"K":"no"}])", 0).find("K"), std::string::npos);
+  EXPECT_NE(read("[{" + pose + R"(,"K":"no"}])", 0).find('K'), std::string::npos);
   EXPECT_NE(read("[3]", 0).find("v.json"), std::string::npos);
   EXPECT_NE(read("{}", 0).find("is no list of views"), std::string::npos);
   EXPECT_NE(read("[{", 0).find("is no valid JSON"), std::string::npos);
