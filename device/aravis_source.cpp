@@ -6,11 +6,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <ctime>
 #include <span>
 
 #include "common/check.h"
 #include "common/error.h"
+#include "device/clock.h"
 #include "device/pixel_packing.h"
 
 namespace mf {
@@ -41,12 +41,6 @@ class Failure {
   std::string field_;
   GError* error_ = nullptr;
 };
-
-std::int64_t clock_ns(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 // Aravis notes CLOCK_REALTIME when a frame's last packet comes; the frame may have waited since.
 FrameArrival arrival_of(ArvBuffer* buffer) {

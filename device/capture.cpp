@@ -4,24 +4,18 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 
 #include "common/error.h"
+#include "device/clock.h"
 
 namespace mf {
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::int64_t monotonic_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 nlohmann::json document_of(const CameraDescription& d) {
   return {{"vendor", d.vendor},
@@ -43,7 +37,7 @@ class Capture {
   Capture(const OpenCamera& open, const std::filesystem::path& session, SessionHeader header,
           const CaptureOptions& options)
       : open_(open), options_(options), camera_(open()), description_(camera_->description()) {
-    const std::int64_t start_ns = monotonic_ns();
+    const std::int64_t start_ns = clock_ns(CLOCK_MONOTONIC);
     camera_->start();  // before there is a session: a camera that does not start leaves none
     header.format = description_.format;
     header.width = description_.width;
@@ -100,7 +94,7 @@ void Capture::step() {
   if (received != Received::lost) return;
   camera_.reset();
   last_number_ = 0;
-  recorder_->note_gap(0, monotonic_ns(), "the camera was lost");
+  recorder_->note_gap(0, clock_ns(CLOCK_MONOTONIC), "the camera was lost");
   next_try_ = Clock::now();
 }
 

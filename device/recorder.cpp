@@ -40,8 +40,7 @@ void Recorder::submit(CameraFrame* frame) {
   {
     const std::lock_guard lock(mutex_);
     queue_.push_back({frame, {}});
-    status_.queued = options_.queue_frames - static_cast<int>(free_.size());
-    status_.most_queued = std::max(status_.most_queued, status_.queued);
+    status_.most_queued = std::max(status_.most_queued, queued());
   }
   changed_.notify_all();
 }
@@ -69,7 +68,7 @@ void Recorder::note_gap(std::int64_t missing, std::int64_t monotonic_ns, const s
 RecorderStatus Recorder::status() const {
   const std::lock_guard lock(mutex_);
   RecorderStatus status = status_;
-  status.queued = options_.queue_frames - static_cast<int>(free_.size());
+  status.queued = queued();
   return status;
 }
 

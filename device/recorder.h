@@ -63,6 +63,7 @@ class Recorder {
     CameraFrame* frame = nullptr;  // nullptr: a gap
     FrameGap gap;
   };
+  [[nodiscard]] int queued() const { return options_.queue_frames - static_cast<int>(free_.size()); }
   void write_frames();
   void write(const Queued&);
   void sync_regularly();

@@ -160,7 +160,7 @@ struct GigeCamera::Impl {
   sockaddr_in controller{};
   Clock::time_point last_heard;
   sockaddr_in destination{};
-  std::deque<Block> recent;
+  std::deque<std::shared_ptr<const Block>> recent;  // a packet is made without the lock
   std::uint64_t next_frame = 1;
   std::uint16_t next_block = 1;
   GigeCameraCounts counts;
@@ -315,10 +315,10 @@ void GigeCamera::Impl::resend(std::span<const std::uint8_t> data) {
   if (data.size() < 12) return;
   const auto number = static_cast<std::uint16_t>(get32(data, 0));
   const std::uint32_t first = get32(data, 4) & 0xFFFFFF, last = get32(data, 8) & 0xFFFFFF;
-  const auto block = std::find_if(recent.begin(), recent.end(), [&](const Block& b) { return b.number == number; });
+  const auto block = std::find_if(recent.begin(), recent.end(), [&](const auto& b) { return b->number == number; });
   if (block == recent.end()) return;
-  for (std::uint32_t packet = first; packet <= std::min(last, block->data_packets() + 1); ++packet) {
-    stream.send(packet_of(*block, packet), destination);
+  for (std::uint32_t packet = first; packet <= std::min(last, (*block)->data_packets() + 1); ++packet) {
+    stream.send(packet_of(**block, packet), destination);
     ++counts.resent;
   }
 }
@@ -380,23 +380,24 @@ void GigeCamera::Impl::send_frames() {
     lock.unlock();
     fill(frame, block.payload);
     lock.lock();
-    recent.push_back(std::move(block));
+    const auto sent = std::make_shared<const Block>(std::move(block));
+    recent.push_back(sent);
     if (recent.size() > kept_blocks) recent.pop_front();
     ++counts.frames;
-    const Block sent = recent.back();
     const Clock::time_point begun = Clock::now();
-    for (std::uint32_t packet = 0; packet <= sent.data_packets() + 1 && streaming(); ++packet) {
+    for (std::uint32_t packet = 0; packet <= sent->data_packets() + 1 && streaming(); ++packet) {
       ++counts.packets;
       if (chance(losses) < options.packet_loss) {
         ++counts.dropped;
         continue;
       }
       lock.unlock();
-      stream.send(packet_of(sent, packet), destination);
+      stream.send(packet_of(*sent, packet), destination);
       // No faster than the wire that a camera has: a burst would overflow buffers that hold on location.
       if (packet % packets_in_a_row == 0)
-        std::this_thread::sleep_until(begun + std::chrono::nanoseconds(packet * (sent.data_per_packet + gvsp_overhead) *
-                                                                       1'000'000'000 / wire_bytes_per_s));
+        std::this_thread::sleep_until(begun +
+                                      std::chrono::nanoseconds(packet * (sent->data_per_packet + gvsp_overhead) *
+                                                               1'000'000'000 / wire_bytes_per_s));
       lock.lock();
     }
   }
