@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <span>
 
 #include "common/check.h"
@@ -55,6 +56,64 @@ std::string text_or_empty(const char* text) {
   return text == nullptr ? std::string() : std::string(text);
 }
 
+class AravisFeatures final : public FeatureAccess {
+ public:
+  void attach(const std::string& camera, ArvDevice* device) {
+    camera_ = camera;
+    device_ = device;
+  }
+  [[nodiscard]] bool has(const std::string& feature) const override {
+    return arv_device_is_feature_available(device_, feature.c_str(), nullptr) != 0;
+  }
+  [[nodiscard]] double number(const std::string& feature) const override;
+  void set_number(const std::string& feature, double value) override;
+  [[nodiscard]] std::string choice(const std::string& feature) const override;
+  void set_choice(const std::string& feature, const std::string& entry) override;
+
+ private:
+  std::string camera_;
+  ArvDevice* device_ = nullptr;  // the camera's
+};
+
+double AravisFeatures::number(const std::string& feature) const {
+  Failure failure(camera_, feature);
+  ArvGcNode* node = arv_device_get_feature(device_, feature.c_str());
+  double value = 0;
+  if (ARV_IS_GC_BOOLEAN(node))
+    value = arv_device_get_boolean_feature_value(device_, feature.c_str(), failure) != 0 ? 1 : 0;
+  else if (ARV_IS_GC_INTEGER(node))
+    value = static_cast<double>(arv_device_get_integer_feature_value(device_, feature.c_str(), failure));
+  else
+    value = arv_device_get_float_feature_value(device_, feature.c_str(), failure);
+  failure.raise_if_any("the camera does not tell it");
+  return value;
+}
+
+void AravisFeatures::set_number(const std::string& feature, double value) {
+  Failure failure(camera_, feature);
+  ArvGcNode* node = arv_device_get_feature(device_, feature.c_str());
+  if (ARV_IS_GC_BOOLEAN(node))
+    arv_device_set_boolean_feature_value(device_, feature.c_str(), value != 0 ? 1 : 0, failure);
+  else if (ARV_IS_GC_INTEGER(node))
+    arv_device_set_integer_feature_value(device_, feature.c_str(), std::llround(value), failure);
+  else
+    arv_device_set_float_feature_value(device_, feature.c_str(), value, failure);
+  failure.raise_if_any("the camera refuses it");
+}
+
+std::string AravisFeatures::choice(const std::string& feature) const {
+  Failure failure(camera_, feature);
+  const char* entry = arv_device_get_string_feature_value(device_, feature.c_str(), failure);
+  failure.raise_if_any("the camera does not tell it");
+  return text_or_empty(entry);
+}
+
+void AravisFeatures::set_choice(const std::string& feature, const std::string& entry) {
+  Failure failure(camera_, feature);
+  arv_device_set_string_feature_value(device_, feature.c_str(), entry.c_str(), failure);
+  failure.raise_if_any("choose one that the camera has");
+}
+
 class AravisSource final : public CameraSource {
  public:
   explicit AravisSource(const CameraSettings& settings);
@@ -63,6 +122,8 @@ class AravisSource final : public CameraSource {
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
   void start() override;
   [[nodiscard]] Received receive(CameraFrame& into, std::chrono::milliseconds at_most) override;
+  void set_exposure_s(double exposure_s) override;
+  [[nodiscard]] FeatureAccess& features() override { return features_; }
 
  private:
   static void on_control_lost(ArvDevice*, void* lost) { static_cast<std::atomic<bool>*>(lost)->store(true); }
@@ -74,6 +135,7 @@ class AravisSource final : public CameraSource {
   std::string name_;
   GObjectPointer<ArvCamera> camera_;
   GObjectPointer<ArvStream> stream_;  // after the camera, so that it goes first
+  AravisFeatures features_;
   WireFormat wire_;
   CameraDescription description_;
   std::atomic<bool> lost_ = false;
@@ -86,6 +148,7 @@ AravisSource::AravisSource(const CameraSettings& settings)
   camera_.reset(arv_camera_new(settings.address.empty() ? nullptr : settings.address.c_str(), failure));
   failure.raise_if_any("see `mirrorfieldd --list`");
   if (camera_ == nullptr) throw InputError(name_, "address", "no camera answers: see `mirrorfieldd --list`");
+  features_.attach(name_, arv_camera_get_device(camera_.get()));
   apply(settings);
   describe();
   open_stream(settings);
@@ -172,6 +235,14 @@ void AravisSource::open_stream(const CameraSettings& settings) {
   failure.raise_if_any("the camera does not tell the size of its frames");
   constexpr int stream_buffers = 24;  // two thirds of a second at 37 frames a second
   for (int i = 0; i < stream_buffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
+}
+
+void AravisSource::set_exposure_s(double exposure_s) {
+  Failure failure(name_, "exposure_s");
+  arv_camera_set_exposure_time(camera_.get(), exposure_s * 1e6, failure);
+  failure.raise_if_any("choose another");
+  description_.exposure_s = 1e-6 * arv_camera_get_exposure_time(camera_.get(), failure);
+  failure.raise_if_any("the camera does not tell its exposure time");
 }
 
 void AravisSource::start() {

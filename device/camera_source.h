@@ -9,6 +9,7 @@
 #include "common/frame.h"
 #include "common/image.h"
 #include "common/session.h"
+#include "device/camera_features.h"
 
 namespace mf {
 
@@ -60,6 +61,9 @@ class CameraSource {
   [[nodiscard]] virtual const CameraDescription& description() const = 0;
   virtual void start() = 0;
   [[nodiscard]] virtual Received receive(CameraFrame& into, std::chrono::milliseconds at_most) = 0;
+  // While it runs, too: frames that are on their way still have the old one. Read back into description().
+  virtual void set_exposure_s(double) = 0;
+  [[nodiscard]] virtual FeatureAccess& features() = 0;
 };
 
 }  // namespace mf

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <map>
 #include <memory>
 #include <set>
 
@@ -36,16 +37,31 @@ struct ScriptRun {
 [[nodiscard]] ImageU16 scripted_codes(std::int64_t number);  // differ from frame to frame
 [[nodiscard]] SessionHeader header_with_target();
 
+// Features that a test puts there: numbers and choices keep what is written.
+class ScriptedFeatures final : public FeatureAccess {
+ public:
+  std::map<std::string, double> numbers;
+  std::map<std::string, std::string> choices;
+  [[nodiscard]] bool has(const std::string& f) const override { return numbers.contains(f) || choices.contains(f); }
+  [[nodiscard]] double number(const std::string& f) const override { return numbers.at(f); }
+  void set_number(const std::string& f, double value) override { numbers.at(f) = value; }
+  [[nodiscard]] std::string choice(const std::string& f) const override { return choices.at(f); }
+  void set_choice(const std::string& f, const std::string& entry) override { choices.at(f) = entry; }
+};
+
 class ScriptedCamera final : public CameraSource {
  public:
   explicit ScriptedCamera(std::shared_ptr<ScriptRun> run);  // throws InputError while it is dead
   [[nodiscard]] const CameraDescription& description() const override { return description_; }
   void start() override {}
   [[nodiscard]] Received receive(CameraFrame& into, std::chrono::milliseconds at_most) override;
+  void set_exposure_s(double exposure_s) override { description_.exposure_s = exposure_s; }
+  [[nodiscard]] FeatureAccess& features() override { return features_; }
 
  private:
   std::shared_ptr<ScriptRun> run_;
   CameraDescription description_;
+  ScriptedFeatures features_;
 };
 
 }  // namespace mf::test

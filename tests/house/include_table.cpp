@@ -99,6 +99,8 @@ const std::vector<Library>& known_libraries() {
       {"libevdev", {"libevdev/", "linux/input"}},
       {"libudev", {"libudev.h"}},
       {"systemd", {"systemd/"}},
+      {"microhttpd", {"microhttpd.h"}},
+      {"umockdev", {"umockdev.h"}},
       {"GoogleTest", {"gtest/", "gmock/"}},
       {"benchmark", {"benchmark/"}},
       {"SIMD", {"immintrin.h", "xmmintrin.h", "x86intrin.h", "pmmintrin.h"}},
@@ -111,8 +113,9 @@ const std::vector<FolderRule>& include_table() {
       {"common/", {}, vocabulary + Names{"SQLite", "TIFF", "AprilTag"}},
       {"common/command_line/", {}, Names{"fmt", "CLI11"}},
       {"device/", {"common/"}, vocabulary + Names{"Aravis", "V4L2", "libusb", "libevdev", "libudev", "systemd"}},
+      {"device/status/", {"common/", "device/rig_status.h", "device/status_socket.h"}, vocabulary + Names{"microhttpd"}},
       // The simulator writes the import format: frames as PNG, truth as EXR, tags as AprilTag draws them.
-      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath"}},
+      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
@@ -129,7 +132,8 @@ const std::vector<FolderRule>& include_table() {
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},
        stage_libraries + Names{"GoogleTest", "benchmark", "OpenCV", "Ceres", "SQLite", "TIFF", "PNG", "OpenEXR",
-                               "Imath", "AprilTag", "Embree", "assimp", "GL", "Aravis"}},
+                               "Imath", "AprilTag", "Embree", "assimp", "GL", "Aravis", "umockdev", "V4L2",
+                               "libevdev", "libusb", "libudev", "systemd", "microhttpd"}},
   };
   return table;
 }
