@@ -19,6 +19,7 @@ find_package(tomlplusplus REQUIRED)
 pkg_check_modules(ARAVIS REQUIRED IMPORTED_TARGET aravis-0.8)
 # Its -pthread defines a macro, and the precompiled headers would not fit; the libraries bring the threads anyway.
 set_property(TARGET PkgConfig::ARAVIS PROPERTY INTERFACE_COMPILE_OPTIONS "")
+pkg_check_modules(ISAL REQUIRED IMPORTED_TARGET libisal)
 pkg_check_modules(EVDEV REQUIRED IMPORTED_TARGET libevdev)
 pkg_check_modules(UDEV REQUIRED IMPORTED_TARGET libudev)
 pkg_check_modules(USB REQUIRED IMPORTED_TARGET libusb-1.0)

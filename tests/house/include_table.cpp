@@ -82,6 +82,7 @@ const std::vector<Library>& known_libraries() {
       {"CLI11", {"CLI/"}},
       {"SQLite", {"sqlite3.h"}},
       {"TIFF", {"tiff.h", "tiffio.h", "tiffvers.h"}},
+      {"ISA-L", {"isa-l"}},
       {"PNG", {"png.h"}},
       {"zlib", {"zlib.h"}},
       {"OpenEXR", {"OpenEXR/", "Imf", "Iex", "IlmThread"}},
@@ -110,7 +111,7 @@ const std::vector<Library>& known_libraries() {
 
 const std::vector<FolderRule>& include_table() {
   static const std::vector<FolderRule> table{
-      {"common/", {}, vocabulary + Names{"SQLite", "TIFF", "AprilTag"}},
+      {"common/", {}, vocabulary + Names{"SQLite", "TIFF", "ISA-L", "AprilTag"}},
       {"common/command_line/", {}, Names{"fmt", "CLI11"}},
       {"device/", {"common/"}, vocabulary + Names{"Aravis", "V4L2", "libusb", "libevdev", "libudev", "systemd"}},
       {"device/status/", {"common/", "device/rig_status.h", "device/status_socket.h"}, vocabulary + Names{"microhttpd"}},
