@@ -16,9 +16,10 @@ namespace mf {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, int error) {
-  throw InputError(path.string(), "",
-                   fmt::format("cannot be written ({}): check the folder, its permissions and the free space",
-                               std::strerror(error)));
+  throw WriteError(
+      path.string(),
+      fmt::format("cannot be written ({}): check the folder, its permissions and the free space", std::strerror(error)),
+      error);
 }
 
 class Descriptor {

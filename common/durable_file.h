@@ -6,7 +6,7 @@
 
 namespace mf {
 
-// Each throws InputError naming the file (disk full, no permission, ...).
+// Each throws WriteError naming the file (disk full, no permission, ...).
 
 // Writes the file aside as "NAME.partial" and renames it, so that NAME never holds half of it. With `durable` the data
 // and the name survive a power cut once this returns.

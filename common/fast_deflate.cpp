@@ -37,7 +37,8 @@ void append_deflated(std::span<const std::uint8_t> bytes, std::string& out) {
   stream.avail_in = static_cast<std::uint32_t>(bytes.size());
   stream.next_out = reinterpret_cast<std::uint8_t*>(out.data() + before);
   stream.avail_out = static_cast<std::uint32_t>(room);
-  check(isal_deflate(&stream) == COMP_OK && stream.internal_state.state == ZSTATE_END, "deflate ends in its worst case");
+  check(isal_deflate(&stream) == COMP_OK && stream.internal_state.state == ZSTATE_END,
+        "deflate ends in its worst case");
   out.resize(before + stream.total_out);
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -60,6 +61,17 @@ CREATE TABLE gaps (
   monotonic_ns INTEGER NOT NULL,
   reason       TEXT NOT NULL
 );
+CREATE TABLE detections (
+  frame INTEGER NOT NULL REFERENCES frames (id),
+  tag   INTEGER NOT NULL,
+  x0 REAL NOT NULL, y0 REAL NOT NULL, x1 REAL NOT NULL, y1 REAL NOT NULL,
+  x2 REAL NOT NULL, y2 REAL NOT NULL, x3 REAL NOT NULL, y3 REAL NOT NULL
+);
+CREATE TABLE online_poses (
+  frame INTEGER PRIMARY KEY REFERENCES frames (id),
+  qw REAL NOT NULL, qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL,
+  tx REAL NOT NULL, ty REAL NOT NULL, tz REAL NOT NULL
+);
 )sql";
 
 fs::path index_file(const fs::path& folder) {
@@ -92,6 +104,7 @@ struct SessionWriter::Impl {
   struct Pending {
     SessionFrame frame;
     bool durable = false;  // its file is already
+    std::string tiff;      // until then: what is written anew when the file cannot be synced
   };
 
   fs::path folder;
@@ -100,14 +113,20 @@ struct SessionWriter::Impl {
   std::mutex pending_mutex;
   std::vector<Pending> pending;
   std::vector<FrameGap> pending_gaps;
+  std::vector<FrameTags> pending_tags;
   std::int64_t next_id = 0;  // the appending thread's own
   std::mutex index_mutex;
   std::optional<SqliteDatabase> index;
   std::int64_t committed = 0;
+  std::atomic<std::int64_t> written_anew = 0;
 
+  void write_under_new_names(SessionFrame&, const std::string& tiff, bool durable, const WriteError& first);
+  void make_durable(std::vector<Pending>&);
   void begin();
   void write_document(const std::string& key, const nlohmann::json&);
-  void insert(const std::vector<Pending>&, const std::vector<FrameGap>&);
+  void insert(const std::vector<Pending>&);
+  void insert(const std::vector<FrameGap>&);
+  void insert(const std::vector<FrameTags>&);
 };
 
 void SessionWriter::Impl::begin() {
@@ -126,14 +145,12 @@ void SessionWriter::Impl::write_document(const std::string& key, const nlohmann:
   write.bind(1, key).bind(2, document.dump()).step();
 }
 
-// One transaction: all rows or none.
-void SessionWriter::Impl::insert(const std::vector<Pending>& frames, const std::vector<FrameGap>& gaps) {
+void SessionWriter::Impl::insert(const std::vector<Pending>& frames) {
   SqliteStatement frame_row(*index,
                             "INSERT INTO frames (id, role, name, exposure_s, nd_density, time_s, file, bytes, crc32) "
                             "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
   SqliteStatement arrival_row(*index, "INSERT INTO arrivals VALUES (?, ?, ?, ?, ?)");
-  SqliteStatement gap_row(*index, "INSERT INTO gaps VALUES (?, ?, ?, ?)");
-  for (const auto& [frame, durable] : frames) {
+  for (const auto& [frame, durable, tiff] : frames) {
     frame_row.bind(1, frame.id).bind(2, std::string(frame_role_name(frame.info.role))).bind(3, frame.info.name);
     frame_row.bind(4, frame.info.exposure_s).bind(5, frame.info.nd_density).bind(6, frame.info.time_s);
     frame_row.bind(7, frame.file).bind(8, frame.bytes).bind(9, std::int64_t{frame.crc32}).step();
@@ -144,9 +161,35 @@ void SessionWriter::Impl::insert(const std::vector<Pending>& frames, const std::
     arrival_row.bind(4, arrival.monotonic_ns).bind(5, arrival.realtime_ns).step();
     arrival_row.reset();
   }
+}
+
+void SessionWriter::Impl::insert(const std::vector<FrameGap>& gaps) {
+  SqliteStatement row(*index, "INSERT INTO gaps VALUES (?, ?, ?, ?)");
   for (const FrameGap& gap : gaps) {
-    gap_row.bind(1, gap.next_id).bind(2, gap.missing).bind(3, gap.monotonic_ns).bind(4, gap.reason).step();
-    gap_row.reset();
+    row.bind(1, gap.next_id).bind(2, gap.missing).bind(3, gap.monotonic_ns).bind(4, gap.reason).step();
+    row.reset();
+  }
+}
+
+void SessionWriter::Impl::insert(const std::vector<FrameTags>& seen) {
+  SqliteStatement tag_row(*index, "INSERT INTO detections VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+  SqliteStatement pose_row(*index, "INSERT OR REPLACE INTO online_poses VALUES (?, ?, ?, ?, ?, ?, ?, ?)");
+  for (const FrameTags& frame : seen) {
+    for (const TagDetection& tag : frame.tags) {
+      tag_row.bind(1, frame.frame).bind(2, std::int64_t{tag.id});
+      for (int corner = 0; corner < 4; ++corner) {
+        const Eigen::Vector2d& at = tag.corners_px[static_cast<std::size_t>(corner)];
+        tag_row.bind(3 + 2 * corner, at.x()).bind(4 + 2 * corner, at.y());
+      }
+      tag_row.step();
+      tag_row.reset();
+    }
+    if (!frame.cam_from_mirror) continue;
+    const Eigen::Quaterniond& q = frame.cam_from_mirror->rotation;
+    const Eigen::Vector3d& t = frame.cam_from_mirror->translation;
+    pose_row.bind(1, frame.frame).bind(2, q.w()).bind(3, q.x()).bind(4, q.y()).bind(5, q.z());
+    pose_row.bind(6, t.x()).bind(7, t.y()).bind(8, t.z()).step();
+    pose_row.reset();
   }
 }
 
@@ -179,7 +222,24 @@ EncodedFrame SessionWriter::encode(const Frame& frame, TiffCompression compressi
   return {frame.info, encode_tiff(frame.pixels, compression), std::nullopt};
 }
 
-std::int64_t SessionWriter::append(const EncodedFrame& frame) {
+// "frames/000007.tif" failed: "frames/000007-1.tif" then, and so on.
+void SessionWriter::Impl::write_under_new_names(SessionFrame& row, const std::string& tiff, bool durable,
+                                                const WriteError& first) {
+  constexpr int most_names = 3;  // a disk that refuses four files in a row is broken
+  if (options.durability == Durability::each || first.disk_is_full()) throw first;
+  for (int attempt = 1;; ++attempt) {
+    row.file = fmt::format("frames/{:06}-{}.tif", row.id, attempt);
+    try {
+      write_whole_file(folder / row.file, tiff, durable);
+      ++written_anew;
+      return;
+    } catch (const WriteError& e) {
+      if (attempt == most_names || e.disk_is_full()) throw;
+    }
+  }
+}
+
+std::int64_t SessionWriter::append(EncodedFrame frame) {
   check(impl_->index.has_value(), "nothing is appended to a finished session");
   check(std::isfinite(frame.info.exposure_s) && frame.info.exposure_s > 0, "a frame's exposure is positive");
   const bool each = impl_->options.durability == Durability::each;
@@ -190,10 +250,14 @@ std::int64_t SessionWriter::append(const EncodedFrame& frame) {
   row.file = fmt::format("frames/{:06}.tif", row.id);
   row.bytes = static_cast<std::int64_t>(frame.tiff.size());
   row.crc32 = crc32(frame.tiff);
-  write_whole_file(impl_->folder / row.file, frame.tiff, each);
+  try {
+    write_whole_file(impl_->folder / row.file, frame.tiff, each);
+  } catch (const WriteError& e) {
+    impl_->write_under_new_names(row, frame.tiff, each, e);
+  }
   {
     const std::lock_guard lock(impl_->pending_mutex);
-    impl_->pending.push_back({row, each});
+    impl_->pending.push_back({row, each, each ? std::string() : std::move(frame.tiff)});
   }
   if (each) commit();
   return impl_->next_id++;
@@ -204,27 +268,48 @@ void SessionWriter::append(const FrameGap& gap) {
   impl_->pending_gaps.push_back(gap);
 }
 
+void SessionWriter::Impl::make_durable(std::vector<Pending>& frames) {
+  bool names_are_new = false;
+  for (Pending& p : frames) {
+    if (p.durable) continue;
+    try {
+      sync_path(folder / p.frame.file);
+    } catch (const WriteError& e) {
+      write_under_new_names(p.frame, p.tiff, true, e);
+    }
+    names_are_new = true;
+  }
+  if (names_are_new) sync_path(folder / "frames");
+}
+
+std::int64_t SessionWriter::written_anew() const {
+  return impl_->written_anew;
+}
+
+void SessionWriter::append(FrameTags seen) {
+  const std::lock_guard lock(impl_->pending_mutex);
+  impl_->pending_tags.push_back(std::move(seen));
+}
+
 std::int64_t SessionWriter::commit() {
   const std::lock_guard index_lock(impl_->index_mutex);
   check(impl_->index.has_value(), "nothing is committed to a finished session");
   std::vector<Impl::Pending> frames;
   std::vector<FrameGap> gaps;
+  std::vector<FrameTags> tags;
   {
     const std::lock_guard lock(impl_->pending_mutex);
     frames = std::exchange(impl_->pending, {});
     gaps = std::exchange(impl_->pending_gaps, {});
+    tags = std::exchange(impl_->pending_tags, {});
   }
-  if (frames.empty() && gaps.empty()) return impl_->committed;
-  bool names_are_new = false;
-  for (const Impl::Pending& p : frames) {
-    if (p.durable) continue;
-    sync_path(impl_->folder / p.frame.file);
-    names_are_new = true;
-  }
-  if (names_are_new) sync_path(impl_->folder / "frames");
-  impl_->index->run("BEGIN");
+  if (frames.empty() && gaps.empty() && tags.empty()) return impl_->committed;
+  impl_->make_durable(frames);
+  impl_->index->run("BEGIN");  // all rows or none
   try {
-    impl_->insert(frames, gaps);
+    impl_->insert(frames);
+    impl_->insert(gaps);
+    impl_->insert(tags);
     impl_->index->run("COMMIT");
   } catch (...) {
     impl_->index->run_quietly("ROLLBACK");
@@ -366,6 +451,31 @@ const std::vector<FrameGap>& SessionReader::gaps() const {
 std::optional<nlohmann::json> SessionReader::document(const std::string& key) const {
   const auto found = impl_->documents.find(key);
   return found == impl_->documents.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::vector<FrameTags> SessionReader::tags() const {
+  const SqliteDatabase index(index_file(impl_->folder), SqliteDatabase::Mode::read_only);
+  std::map<std::int64_t, FrameTags> seen;
+  if (!has_table(index, "detections")) return {};
+  SqliteStatement tag_rows(index, "SELECT * FROM detections ORDER BY frame, tag");
+  while (tag_rows.step()) {
+    TagDetection tag;
+    tag.id = static_cast<int>(tag_rows.integer(1));
+    for (int corner = 0; corner < 4; ++corner)
+      tag.corners_px[static_cast<std::size_t>(corner)] = {tag_rows.real(2 + 2 * corner), tag_rows.real(3 + 2 * corner)};
+    seen[tag_rows.integer(0)].tags.push_back(tag);
+  }
+  SqliteStatement pose_rows(index, "SELECT * FROM online_poses");
+  while (pose_rows.step())
+    seen[pose_rows.integer(0)].cam_from_mirror =
+        Rigid3{Eigen::Quaterniond(pose_rows.real(1), pose_rows.real(2), pose_rows.real(3), pose_rows.real(4)),
+               {pose_rows.real(5), pose_rows.real(6), pose_rows.real(7)}};
+  std::vector<FrameTags> list;
+  for (auto& [frame, tags] : seen) {
+    tags.frame = frame;
+    list.push_back(std::move(tags));
+  }
+  return list;
 }
 
 std::vector<SessionFrame> SessionReader::frames(FrameRole role) const {

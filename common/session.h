@@ -11,6 +11,8 @@
 
 #include "common/frame.h"
 #include "common/mirror_target.h"
+#include "common/rigid3.h"
+#include "common/tag_detector.h"
 #include "common/tiff_image.h"
 
 namespace mf {
@@ -49,6 +51,13 @@ struct FrameGap {
   std::string reason;             // one line
 };
 
+// What was seen in a frame while it was recorded.
+struct FrameTags {
+  std::int64_t frame = 0;                 // its id
+  std::vector<TagDetection> tags;         // of the mirror and of the world
+  std::optional<Rigid3> cam_from_mirror;  // the online pose, when there was one
+};
+
 struct SessionFrame {
   std::int64_t id = 0;  // in the order of recording
   FrameInfo info;
@@ -68,7 +77,8 @@ struct EncodedFrame {
 // A recording on disk: `session.db` (SQLite, WAL) and `frames/NNNNNN.tif` (16-bit TIFF, or 32-bit float for linear
 // frames; deflate with predictor). A frame's row exists only once its file is durable. docs/session.md has the schema.
 //
-// The one writer. Throws InputError naming the file: the folder exists already, disk full, no permission.
+// The one writer. Throws InputError naming the file: the folder exists already, no permission; WriteError when the
+// system does not write: the disk is full, or broken.
 class SessionWriter {
  public:
   enum class Durability {
@@ -85,12 +95,18 @@ class SessionWriter {
   // Precondition: format and size as in the header. Safe to call from many threads at once, and beside append().
   [[nodiscard]] EncodedFrame encode(const Frame&, TiffCompression = TiffCompression::deflate) const;
   // Returns the frame's id: 0, 1, 2 ... Names are unique in a role.
-  std::int64_t append(const EncodedFrame&);
+  std::int64_t append(EncodedFrame);
   std::int64_t append(const Frame& frame) { return append(encode(frame)); }
   // May run in a thread of its own beside append(). Returns how many frames the session has durably, in all.
   std::int64_t commit();
+  // In batches, a frame whose file could not be written or synced is written again, under another name: the same file
+  // is never tried twice, as what a failed sync leaves of it cannot be known (Rebello et al. 2020). So many times that
+  // happened. When it does not help either, or the disk is full, append() and commit() throw.
+  [[nodiscard]] std::int64_t written_anew() const;
   // Durable with the frames appended before it.
   void append(const FrameGap&);
+  // Likewise. Its frame was appended before.
+  void append(FrameTags);
   // A document beside the header's, durable at once: what the camera said of itself, say. Replaces one of this key.
   void write_document(const std::string& key, const nlohmann::json&);
   // Everything durable, the index closed and a single file. A session without it is still readable up to its last
@@ -117,6 +133,8 @@ class SessionReader {
   [[nodiscard]] const std::vector<FrameGap>& gaps() const;          // by next_id
   // What write_document() wrote; nothing when there is no such document.
   [[nodiscard]] std::optional<nlohmann::json> document(const std::string& key) const;
+  // What was seen while recording, by frame; not every frame was looked at, and imported ones never. Throws InputError.
+  [[nodiscard]] std::vector<FrameTags> tags() const;
   // Throws InputError naming the file when it is missing, truncated, damaged or of another size.
   [[nodiscard]] Frame read_frame(const SessionFrame&) const;
 

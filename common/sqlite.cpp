@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
+#include <cerrno>
+
 #include "common/error.h"
 
 namespace mf {
@@ -35,7 +37,10 @@ void SqliteDatabase::fail(int code) const {
   if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB)
     remedy = "it is damaged or no index of a session; restore it from a copy";
   const char* reason = handle_ ? sqlite3_errmsg(handle_.get()) : sqlite3_errstr(code);
-  throw InputError(file_, "", fmt::format("cannot be used as the session's index ({}): {}", reason, remedy));
+  const std::string problem = fmt::format("cannot be used as the session's index ({}): {}", reason, remedy);
+  if (primary == SQLITE_FULL) throw WriteError(file_, problem, ENOSPC);
+  if (primary == SQLITE_IOERR) throw WriteError(file_, problem, EIO);
+  throw InputError(file_, "", problem);
 }
 
 void SqliteDatabase::run(const char* sql) {

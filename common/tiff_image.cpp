@@ -225,10 +225,10 @@ Image<Pixel> read_blocks(TIFF* tiff, const Layout& layout, const MemoryFile& mem
   return image;
 }
 
-// Each row as the differences of its neighbours, channel by channel (TIFF 6.0, section 14), deflated: what libtiff writes
-// with PREDICTOR_HORIZONTAL, but fast enough for a camera.
-void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::uint16_t> pixels, std::size_t row_length,
-                          std::size_t channels) {
+// Each row as the differences of its neighbours, channel by channel (TIFF 6.0, section 14), deflated: what libtiff
+// writes with PREDICTOR_HORIZONTAL, but fast enough for a camera.
+void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::uint16_t> pixels,
+                          std::size_t row_length, std::size_t channels) {
   thread_local std::vector<std::uint16_t> differences;
   thread_local std::string deflated;
   differences.resize(pixels.size());
@@ -236,7 +236,8 @@ void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::
     const std::uint16_t* from = pixels.data() + begin;
     std::uint16_t* to = differences.data() + begin;
     std::copy_n(from, channels, to);
-    for (std::size_t i = channels; i < row_length; ++i) to[i] = static_cast<std::uint16_t>(from[i] - from[i - channels]);
+    for (std::size_t i = channels; i < row_length; ++i)
+      to[i] = static_cast<std::uint16_t>(from[i] - from[i - channels]);
   }
   deflated.clear();
   append_deflated({reinterpret_cast<const std::uint8_t*>(differences.data()), 2 * differences.size()}, deflated);

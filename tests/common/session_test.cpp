@@ -240,6 +240,45 @@ TEST(Session, ArrivalsGapsAndDocumentsComeBack) {
   EXPECT_FALSE(reader.document("none").has_value());
 }
 
+TEST(Session, WhatWasSeenWhileRecordingComesBack) {
+  const test::TemporaryFolder folder;
+  SessionWriter writer(folder / "s", header_of({}), {SessionWriter::Durability::batches});
+  FrameTags seen;
+  seen.frame = writer.append(frame_of({}, 0));
+  TagDetection tag;
+  tag.id = 17;
+  tag.corners_px = {{{1.5, 2.25}, {30.5, 2.5}, {30, 31}, {1, 30}}};
+  seen.tags = {tag};
+  seen.cam_from_mirror = Rigid3{Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {0.1, -0.2, 1.5}};
+  writer.append(seen);
+  writer.append(frame_of({}, 1));
+  writer.finish();
+  const std::vector<FrameTags> tags = SessionReader(folder / "s").tags();
+  ASSERT_EQ(tags.size(), 1U);
+  EXPECT_EQ(tags[0].frame, 0);
+  ASSERT_EQ(tags[0].tags.size(), 1U);
+  EXPECT_EQ(tags[0].tags[0].id, 17);
+  EXPECT_EQ(tags[0].tags[0].corners_px, tag.corners_px);
+  ASSERT_TRUE(tags[0].cam_from_mirror.has_value());
+  EXPECT_EQ(tags[0].cam_from_mirror->translation, seen.cam_from_mirror->translation);
+  EXPECT_EQ(tags[0].cam_from_mirror->rotation.coeffs(), seen.cam_from_mirror->rotation.coeffs());
+}
+
+TEST(Session, AFileThatTheDiskRefusesIsWrittenUnderAnotherName) {
+  const test::TemporaryFolder folder;
+  SessionWriter writer(folder / "s", header_of({}), {SessionWriter::Durability::batches});
+  fs::create_directory(folder / "s/frames/000001.tif.partial");  // opening that for writing fails
+  for (int i = 0; i < 3; ++i) writer.append(frame_of({}, i));
+  EXPECT_EQ(writer.written_anew(), 1);
+  writer.finish();
+  const SessionReader reader(folder / "s");
+  ASSERT_EQ(reader.frames().size(), 3U);
+  EXPECT_EQ(reader.frames()[1].file, "frames/000001-1.tif");
+  for (int i = 0; i < 3; ++i)
+    EXPECT_TRUE(test::same_pixels(reader.read_frame(reader.frames()[static_cast<std::size_t>(i)]).pixels,
+                                  frame_of({}, i).pixels));
+}
+
 TEST(Session, AnExistingFolderIsRefusedAndKept) {
   const test::TemporaryFolder folder;
   write_session(folder / "s", {}, 1);
