@@ -127,6 +127,7 @@ class AravisSource final : public CameraSource {
 
  private:
   static void on_control_lost(ArvDevice*, void* lost) { static_cast<std::atomic<bool>*>(lost)->store(true); }
+  static void on_stream_event(void*, ArvStreamCallbackType, ArvBuffer*);
   void apply(const CameraSettings&);
   void describe();
   void open_stream(const CameraSettings&);
@@ -221,16 +222,24 @@ void AravisSource::describe() {
     d.genicam_xml.assign(xml, size);
 }
 
+// The stream's own thread: when it waits for a core, the socket's buffer overflows in a frame's time or two.
+void AravisSource::on_stream_event(void*, ArvStreamCallbackType type, ArvBuffer*) {
+  constexpr int lowest_realtime = 1, above_others = -10;
+  if (type == ARV_STREAM_CALLBACK_TYPE_INIT && arv_make_thread_realtime(lowest_realtime) == 0)
+    arv_make_thread_high_priority(above_others);  // neither is given to everybody; without, it works on a quiet machine
+}
+
 void AravisSource::open_stream(const CameraSettings& settings) {
   Failure failure(name_, "");
-  stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, failure));
+  stream_.reset(arv_camera_create_stream(camera_.get(), on_stream_event, nullptr, failure));
   failure.raise_if_any("another program may have the camera");
   if (stream_ == nullptr) throw InputError(name_, "", "gives no stream: another program may have the camera");
   constexpr unsigned frame_retention_us = 500'000;  // for packets that are asked for again on a busy board
+  constexpr double packet_request_ratio = 1;        // a frame may lose all its packets at first, and be asked for again
   if (ARV_IS_GV_STREAM(stream_.get()))
     g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
                  settings.socket_buffer_bytes, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_ALWAYS, "frame-retention",
-                 frame_retention_us, nullptr);
+                 frame_retention_us, "packet-request-ratio", packet_request_ratio, nullptr);
   const std::size_t payload = arv_camera_get_payload(camera_.get(), failure);
   failure.raise_if_any("the camera does not tell the size of its frames");
   constexpr int stream_buffers = 24;  // two thirds of a second at 37 frames a second
