@@ -4,11 +4,9 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
-#include <memory>
-#include <optional>
 
-#include "device/camera_source.h"
-#include "device/recorder.h"
+#include "device/camera_keeper.h"
+#include "device/recording.h"
 
 namespace mf {
 
@@ -24,9 +22,6 @@ struct CaptureResult {
   double seconds = 0;
 };
 
-// Opens the camera; called again whenever it was lost. Throws InputError.
-using OpenCamera = std::function<std::unique_ptr<CameraSource>()>;
-
 // Records one session until `stop` or most_seconds: opens the camera, writes its description beside the frames
 // (document "device"), and counts what the camera's own frame numbers say is missing. A lost camera is opened again
 // into the same session, with a gap. `header` gives what the camera does not know: format and size are set from the
@@ -35,8 +30,5 @@ using OpenCamera = std::function<std::unique_ptr<CameraSource>()>;
 [[nodiscard]] CaptureResult capture(const OpenCamera&, const std::filesystem::path& session, SessionHeader header,
                                     const CaptureOptions&, const std::atomic<bool>& stop,
                                     const std::function<void(const RecorderStatus&)>& each_second = {});
-
-// Frames between two of the camera's numbers. GigE Vision's 16-bit numbers go from 65535 to 1; 0 is no number.
-[[nodiscard]] std::int64_t frames_between(std::int64_t before, std::int64_t after);
 
 }  // namespace mf
