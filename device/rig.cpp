@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device/rig.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <utility>
+
+#include "common/error.h"
+
+namespace mf {
+
+namespace {
+
+using RigClock = std::chrono::steady_clock;
+
+double seconds_since(RigClock::time_point when) {
+  return std::chrono::duration<double>(RigClock::now() - when).count();
+}
+
+// 20261122-101530, and -2, -3 ... where that is taken already.
+std::filesystem::path new_session(const std::filesystem::path& folder) {
+  const std::filesystem::path first = folder / fmt::format("{:%Y%m%d-%H%M%S}", fmt::gmtime(std::time(nullptr)));
+  std::filesystem::path name = first;
+  for (int i = 2; std::filesystem::exists(name); ++i) name = fmt::format("{}-{}", first.string(), i);
+  return name;
+}
+
+std::int64_t free_bytes(const std::filesystem::path& folder) {
+  std::error_code unknown;
+  const auto space = std::filesystem::space(folder, unknown);
+  return unknown ? 0 : static_cast<std::int64_t>(space.available);
+}
+
+}  // namespace
+
+Rig::Rig(OpenCamera open, const RigOptions& options, RigLinks links)
+    : keeper_(std::move(open), options.reopen_each),
+      options_(options),
+      links_(std::move(links)),
+      told_(RigClock::now()),
+      rated_(told_) {
+  const CameraDescription& camera = keeper_.description();
+  spare_.codes = ImageU16(camera.width, camera.height, 1);
+  status_.camera = fmt::format("{} {} {}", camera.vendor, camera.model, camera.serial);
+  status_.queue_frames = options.recorder.queue_frames;
+}
+
+void Rig::step() {
+  if (links_.next_command)
+    if (const auto command = links_.next_command()) obey(*command);
+  CameraFrame& into = recording_ ? recording_->next_buffer() : spare_;
+  const Received received = keeper_.receive(into, std::chrono::milliseconds(100));
+  if (received == Received::frame) ++frames_;
+  if (recording_) {
+    recording_->take(received);
+    watch_recording();
+  }
+  tell_regularly();
+}
+
+void Rig::obey(RigCommand command) {
+  if (command == RigCommand::start && !recording_) start();
+  if (command == RigCommand::stop && recording_) stop();
+}
+
+void Rig::start() {
+  alarm_.clear();
+  continuations_ = 0;
+  status_.lost_frames = status_.gaps = status_.durable_frames = 0;
+  began_ = RigClock::now();
+  try {
+    const std::int64_t free = free_bytes(options_.recordings);
+    if (free < options_.least_free_bytes)
+      throw InputError(options_.recordings.string(), "",
+                       fmt::format("has {} MB left: free some space before recording", free >> 20));
+    begin(options_.session ? *std::exchange(options_.session, std::nullopt) : new_session(options_.recordings));
+  } catch (const InputError& e) {
+    end(RigState::error, e.what());
+  }
+}
+
+void Rig::begin(const std::filesystem::path& session) {
+  recording_.emplace(session, options_.header, keeper_.description(), options_.recorder);
+  status_.session = session.string();
+}
+
+void Rig::stop() {
+  const RecorderStatus last = recording_->finish();
+  note(last);
+  recording_.reset();
+  end(last.failure ? RigState::error : RigState::done, last.failure.value_or(alarm_));
+}
+
+void Rig::end(RigState state, const std::string& problem) {
+  status_.state = state;
+  status_.problem = problem;
+  told_ = {};
+}
+
+void Rig::note(const RecorderStatus& r) {
+  status_.durable_frames = r.durable;
+  status_.lost_frames = r.lost;
+  status_.gaps = r.gaps;
+  status_.queued = r.queued;
+  status_.seconds = seconds_since(began_);
+  if (r.written_anew > 0)
+    alarm_ = fmt::format("the disk refused {} files: the frames went to others; use another disk soon", r.written_anew);
+}
+
+void Rig::watch_recording() {
+  const RecorderStatus now = recording_->status();
+  note(now);
+  if (now.failure) return now.disk_is_full ? stop() : go_on_elsewhere(now);
+  if (now.durable > 0 && status_.state != RigState::recording) {
+    status_.state = RigState::recording;
+    told_ = {};
+  }
+  std::string problem = alarm_;
+  if (keeper_.camera() == nullptr) problem = "the camera is away: check its cable and its power";
+  if (problem.empty() && now.lost > 0) problem = fmt::format("{} frames are missing in {} gaps", now.lost, now.gaps);
+  if (problem != std::exchange(status_.problem, problem)) told_ = {};
+  if (options_.most_seconds > 0 && status_.seconds >= options_.most_seconds) stop();
+}
+
+// What was durable stays as it is, and the failing file is not tried again.
+void Rig::go_on_elsewhere(const RecorderStatus& failed) {
+  constexpr int most_continuations = 5;  // then the disk is no disk any more
+  const std::filesystem::path before = recording_->session();
+  recording_->finish();
+  recording_.reset();
+  if (++continuations_ > most_continuations) return end(RigState::error, *failed.failure);
+  try {
+    const std::string base = before.string().substr(0, before.string().size() - (continuations_ > 1 ? 2 : 0));
+    begin(fmt::format("{}-{}", base, continuations_ + 1));
+    alarm_ = fmt::format("{}: the recording goes on in {}", *failed.failure, recording_->session().string());
+    status_.problem = alarm_;
+    told_ = {};
+  } catch (const InputError& e) {
+    end(RigState::error, e.what());
+  }
+}
+
+void Rig::tell_regularly() {
+  if (RigClock::now() - told_ < options_.tell_each) return;
+  told_ = RigClock::now();
+  if (const double since = seconds_since(rated_); since >= 1) {
+    status_.frame_rate_hz = static_cast<double>(std::exchange(frames_, 0)) / since;
+    rated_ = RigClock::now();
+    status_.free_bytes = free_bytes(options_.recordings);
+  }
+  status_.exposure_s = keeper_.description().exposure_s;
+  if (links_.tell) links_.tell(status_);
+}
+
+}  // namespace mf
