@@ -6,9 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "common/camera_model.h"
 #include "common/progress.h"
-#include "common/rigid3.h"
 
 namespace mf::sim {
 
@@ -23,11 +21,6 @@ struct CaptureOptions {
   // What is wrong, or nothing.
   [[nodiscard]] std::optional<std::string> validate() const;
 };
-
-// The rig's camera: pinhole, 1.13 m from the world origin, looking down at it by 41°.
-[[nodiscard]] CameraModel desk_camera(int size);
-// Camera poses of the truth pictures; the first is the rig's own camera.
-[[nodiscard]] Rigid3 desk_cam_from_world(int view);
 
 // Simulates a whole recording of desk_scene() and writes it in the import format (docs/import.md): frames.json,
 // frames/, camera.json, target.json, world.json, scene.png, sweep.json, sweep/, reference.json, and beside it truth/:

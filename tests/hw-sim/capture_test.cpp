@@ -13,6 +13,7 @@
 #include "common/error.h"
 #include "common/json_file.h"
 #include "common/tag_detector.h"
+#include "hw-sim/desk_rig.h"
 #include "hw-sim/mirror_plate.h"
 #include "hw-sim/motion.h"
 #include "hw-sim/sensor.h"
