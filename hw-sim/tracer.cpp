@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "common/check.h"
@@ -199,8 +200,9 @@ Rgb Tracer::radiance(const Ray& camera_ray, const std::optional<MirrorPlate::Pla
 
 namespace {
 
+// `mirrors`: where the plate is, if it is there, at equal steps through the exposure.
 Rgb trace_pixel(const Tracer& tracer, const Shot& shot, const Rigid3& world_from_cam,
-                const std::optional<MirrorPlate::Placement>& mirror, int x, int y) {
+                std::span<const std::optional<MirrorPlate::Placement>> mirrors, int x, int y) {
   Sampler sampler(mix(shot.seed, (static_cast<std::uint64_t>(y) << 32U) + static_cast<std::uint64_t>(x)));
   const Vector3f origin = world_from_cam.translation.cast<float>();
   Rgb sum = Rgb::Zero();
@@ -210,7 +212,9 @@ Rgb trace_pixel(const Tracer& tracer, const Shot& shot, const Rigid3& world_from
     const std::optional<Eigen::Vector3d> in_cam = shot.camera.unproject(pixel);
     if (!in_cam) continue;
     const Vector3f direction = (world_from_cam.rotation * in_cam->normalized()).cast<float>();
-    sum += tracer.radiance({origin, direction}, mirror, sampler);
+    // Neighbours see other moments: what is left of the steps is noise, not ghosts.
+    const std::size_t moment = static_cast<std::size_t>(s + 3 * x + 5 * y) % mirrors.size();
+    sum += tracer.radiance({origin, direction}, mirrors[moment], sampler);
   }
   return sum / static_cast<float>(shot.samples);
 }
@@ -221,13 +225,14 @@ ImageF render(const Tracer& tracer, const Shot& shot) {
   check(shot.samples > 0, "a pixel has samples");
   ImageF picture(shot.camera.width, shot.camera.height, 3);
   const Rigid3 world_from_cam = shot.cam_from_world.inverse();
-  std::optional<MirrorPlate::Placement> mirror;
-  if (shot.world_from_mirror) mirror.emplace(*shot.world_from_mirror);
+  std::vector<std::optional<MirrorPlate::Placement>> mirrors(1);
+  if (shot.world_from_mirror) mirrors[0].emplace(*shot.world_from_mirror);
+  for (const Rigid3& pose : shot.later) mirrors.emplace_back(pose);
   const Region& r = shot.region;
   check(r.x0 >= 0 && r.y0 >= 0 && r.x1 <= picture.width && r.y1 <= picture.height, "the region lies in the picture");
   parallel_for(r.y0, r.y1, [&](int y) {
     for (int x = r.x0; x < r.x1; ++x) {
-      const Rgb value = trace_pixel(tracer, shot, world_from_cam, mirror, x, y);
+      const Rgb value = trace_pixel(tracer, shot, world_from_cam, mirrors, x, y);
       std::copy(value.data(), value.data() + 3, &picture.at(x, y));
     }
   });

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "common/camera_model.h"
 #include "common/image.h"
@@ -44,6 +45,7 @@ struct Shot {
   Region region;    // only these pixels are traced, the rest is black
   int samples = 4;  // per pixel, spread over its square
   std::uint64_t seed = 0;
+  std::vector<Rigid3> later;  // world_from_mirror at equal steps through the exposure: motion blur
 };
 
 // Three channels, linear radiance. Uses every core; the picture depends on nothing but its arguments.
