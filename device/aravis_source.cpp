@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "device/aravis_source.h"
 
-#include <arv.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,37 +10,13 @@
 
 #include "common/check.h"
 #include "common/error.h"
+#include "device/aravis_features.h"
 #include "device/clock.h"
 #include "device/pixel_packing.h"
 
 namespace mf {
 
 namespace {
-
-struct ObjectRelease {
-  void operator()(void* object) const { g_object_unref(object); }
-};
-template <typename T>
-using GObjectPointer = std::unique_ptr<T, ObjectRelease>;
-
-// Receives Aravis' error and turns it into ours.
-class Failure {
- public:
-  Failure(std::string camera, std::string field) : camera_(std::move(camera)), field_(std::move(field)) {}
-  Failure(const Failure&) = delete;
-  Failure& operator=(const Failure&) = delete;
-  ~Failure() { g_clear_error(&error_); }
-  operator GError**() { return &error_; }  // NOLINT(google-explicit-constructor): stands where Aravis wants a GError**
-
-  void raise_if_any(const std::string& remedy) const {
-    if (error_ != nullptr) throw InputError(camera_, field_, fmt::format("{}: {}", error_->message, remedy));
-  }
-
- private:
-  std::string camera_;
-  std::string field_;
-  GError* error_ = nullptr;
-};
 
 // Aravis notes CLOCK_REALTIME when a frame's last packet comes; the frame may have waited since.
 FrameArrival arrival_of(ArvBuffer* buffer) {
@@ -50,68 +25,6 @@ FrameArrival arrival_of(ArvBuffer* buffer) {
   const std::int64_t waited = noted > 0 ? std::max<std::int64_t>(realtime_now - noted, 0) : 0;
   return {static_cast<std::int64_t>(arv_buffer_get_frame_id(buffer)),
           static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer)), monotonic_now - waited, realtime_now - waited};
-}
-
-std::string text_or_empty(const char* text) {
-  return text == nullptr ? std::string() : std::string(text);
-}
-
-class AravisFeatures final : public FeatureAccess {
- public:
-  void attach(const std::string& camera, ArvDevice* device) {
-    camera_ = camera;
-    device_ = device;
-  }
-  [[nodiscard]] bool has(const std::string& feature) const override {
-    return arv_device_is_feature_available(device_, feature.c_str(), nullptr) != 0;
-  }
-  [[nodiscard]] double number(const std::string& feature) const override;
-  void set_number(const std::string& feature, double value) override;
-  [[nodiscard]] std::string choice(const std::string& feature) const override;
-  void set_choice(const std::string& feature, const std::string& entry) override;
-
- private:
-  std::string camera_;
-  ArvDevice* device_ = nullptr;  // the camera's
-};
-
-double AravisFeatures::number(const std::string& feature) const {
-  Failure failure(camera_, feature);
-  ArvGcNode* node = arv_device_get_feature(device_, feature.c_str());
-  double value = 0;
-  if (ARV_IS_GC_BOOLEAN(node))
-    value = arv_device_get_boolean_feature_value(device_, feature.c_str(), failure) != 0 ? 1 : 0;
-  else if (ARV_IS_GC_INTEGER(node))
-    value = static_cast<double>(arv_device_get_integer_feature_value(device_, feature.c_str(), failure));
-  else
-    value = arv_device_get_float_feature_value(device_, feature.c_str(), failure);
-  failure.raise_if_any("the camera does not tell it");
-  return value;
-}
-
-void AravisFeatures::set_number(const std::string& feature, double value) {
-  Failure failure(camera_, feature);
-  ArvGcNode* node = arv_device_get_feature(device_, feature.c_str());
-  if (ARV_IS_GC_BOOLEAN(node))
-    arv_device_set_boolean_feature_value(device_, feature.c_str(), value != 0 ? 1 : 0, failure);
-  else if (ARV_IS_GC_INTEGER(node))
-    arv_device_set_integer_feature_value(device_, feature.c_str(), std::llround(value), failure);
-  else
-    arv_device_set_float_feature_value(device_, feature.c_str(), value, failure);
-  failure.raise_if_any("the camera refuses it");
-}
-
-std::string AravisFeatures::choice(const std::string& feature) const {
-  Failure failure(camera_, feature);
-  const char* entry = arv_device_get_string_feature_value(device_, feature.c_str(), failure);
-  failure.raise_if_any("the camera does not tell it");
-  return text_or_empty(entry);
-}
-
-void AravisFeatures::set_choice(const std::string& feature, const std::string& entry) {
-  Failure failure(camera_, feature);
-  arv_device_set_string_feature_value(device_, feature.c_str(), entry.c_str(), failure);
-  failure.raise_if_any("choose one that the camera has");
 }
 
 class AravisSource final : public CameraSource {
@@ -123,7 +36,7 @@ class AravisSource final : public CameraSource {
   void start() override;
   [[nodiscard]] Received receive(CameraFrame& into, std::chrono::milliseconds at_most) override;
   void set_exposure_s(double exposure_s) override;
-  [[nodiscard]] FeatureAccess& features() override { return features_; }
+  [[nodiscard]] FeatureAccess& features() override { return *features_; }
 
  private:
   static void on_control_lost(ArvDevice*, void* lost) { static_cast<std::atomic<bool>*>(lost)->store(true); }
@@ -135,8 +48,8 @@ class AravisSource final : public CameraSource {
 
   std::string name_;
   GObjectPointer<ArvCamera> camera_;
-  GObjectPointer<ArvStream> stream_;  // after the camera, so that it goes first
-  AravisFeatures features_;
+  GObjectPointer<ArvStream> stream_;        // after the camera, so that it goes first
+  std::optional<AravisFeatures> features_;  // once the camera is open
   WireFormat wire_;
   CameraDescription description_;
   std::atomic<bool> lost_ = false;
@@ -149,9 +62,12 @@ AravisSource::AravisSource(const CameraSettings& settings)
   camera_.reset(arv_camera_new(settings.address.empty() ? nullptr : settings.address.c_str(), failure));
   failure.raise_if_any("see `mirrorfieldd --list`");
   if (camera_ == nullptr) throw InputError(name_, "address", "no camera answers: see `mirrorfieldd --list`");
-  features_.attach(name_, arv_camera_get_device(camera_.get()));
+  features_.emplace(name_, arv_camera_get_device(camera_.get()));
+  description_.steady = hold_steady(*features_);
   apply(settings);
   describe();
+  description_.response = apply_response(*features_, settings.response, description_.exposure_s);
+  description_.ptp = settings.ptp ? set_ptp(*features_, *settings.ptp) : read_ptp(*features_);
   open_stream(settings);
   g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(on_control_lost), &lost_);
 }
@@ -252,6 +168,8 @@ void AravisSource::set_exposure_s(double exposure_s) {
   failure.raise_if_any("choose another");
   description_.exposure_s = 1e-6 * arv_camera_get_exposure_time(camera_.get(), failure);
   failure.raise_if_any("the camera does not tell its exposure time");
+  if (description_.response.scheme != "linear")  // knees may be times
+    description_.response = apply_response(*features_, std::nullopt, description_.exposure_s);
 }
 
 void AravisSource::start() {

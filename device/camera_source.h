@@ -10,6 +10,9 @@
 #include "common/image.h"
 #include "common/session.h"
 #include "device/camera_features.h"
+#include "device/ptp.h"
+#include "device/response_table.h"
+#include "device/steady_settings.h"
 
 namespace mf {
 
@@ -21,6 +24,8 @@ struct CameraSettings {
   std::optional<double> exposure_s;
   std::optional<double> gain_db;
   std::optional<double> frame_rate_hz;
+  std::optional<ResponseRequest> response;
+  std::optional<bool> ptp;                     // whether the camera's clock follows the network's master (IEEE 1588)
   int packet_bytes = 1400;                     // GigE: fits every network; 8000 where jumbo frames pass
   int socket_buffer_bytes = 16 * 1024 * 1024;  // GigE: net.core.rmem_max must allow it
 };
@@ -34,7 +39,10 @@ struct CameraDescription {
   double exposure_s = 0;
   double gain_db = 0;
   double frame_rate_hz = 0;  // 0: unknown
-  std::string genicam_xml;   // empty when there is none
+  ResponseSetting response;
+  SteadySettings steady;
+  PtpReport ptp;
+  std::string genicam_xml;  // empty when there is none
 };
 
 struct CameraFrame {

@@ -44,7 +44,7 @@ struct DeskRig {
 
   [[nodiscard]] Shot shot(const std::optional<Rigid3>& world_from_mirror, const Region& region, int samples,
                           std::uint64_t seed) const {
-    return {camera, cam_from_world, world_from_mirror, region, samples, seed};
+    return {camera, cam_from_world, world_from_mirror, region, samples, seed, {}};
   }
 };
 

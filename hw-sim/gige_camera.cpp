@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
@@ -108,6 +109,8 @@ struct Block {
   std::uint16_t number = 0;
   std::uint64_t timestamp_ns = 0;
   std::size_t data_per_packet = 0;
+  std::uint32_t pfnc = 0;
+  bool chunks = false;
   Bytes payload;
 
   [[nodiscard]] std::uint32_t data_packets() const {
@@ -118,9 +121,9 @@ struct Block {
 }  // namespace
 
 struct GigeCamera::Impl {
-  Impl(const GigeCameraOptions& o, Fill f)
+  Impl(const GigeCameraOptions& o, Expose e)
       : options(o),
-        fill(std::move(f)),
+        expose(std::move(e)),
         control(o.address, gvcp_port),
         stream(o.address, 0),
         registers(o),
@@ -140,6 +143,8 @@ struct GigeCamera::Impl {
   void boot();
 
   void send_frames();
+  [[nodiscard]] Block next_frame_to_take(GigeShot&);
+  static void append_chunks(Block&, std::size_t picture_bytes, const GigeShot&);
   [[nodiscard]] Bytes packet_of(const Block&, std::uint32_t packet) const;
   [[nodiscard]] std::uint64_t clock_ns() const;
   [[nodiscard]] bool streaming() const {
@@ -147,7 +152,7 @@ struct GigeCamera::Impl {
   }
 
   const GigeCameraOptions options;
-  const Fill fill;
+  const Expose expose;
   const Socket control;
   const Socket stream;
 
@@ -179,6 +184,10 @@ void GigeCamera::Impl::boot() {
 }
 
 std::uint64_t GigeCamera::Impl::clock_ns() const {
+  if (registers.read(gige::ptp_enable) == 1U) {
+    const auto real = std::chrono::system_clock::now().time_since_epoch();
+    return static_cast<std::uint64_t>(std::chrono::nanoseconds(real).count() + options.ptp_offset_ns);
+  }
   const double host = std::chrono::duration<double, std::nano>(Clock::now() - booted).count();
   return static_cast<std::uint64_t>(host * (1 + 1e-6 * options.clock_ppm));
 }
@@ -305,6 +314,15 @@ void GigeCamera::Impl::after_write(std::uint32_t address, const sockaddr_in& fro
     case gige::acquisition:
       next_block = 1;
       break;
+    case gige::ptp_enable:
+      registers.set(gige::ptp_status, registers.read(address) == 1U ? 9U : 3U);
+      break;
+    case gige::ptp_latch: {
+      const auto offset = static_cast<std::uint64_t>(options.ptp_offset_ns);
+      registers.set(gige::ptp_offset_ns, static_cast<std::uint32_t>(offset >> 32));
+      registers.set(gige::ptp_offset_ns + 4, static_cast<std::uint32_t>(offset));
+      break;
+    }
     default:
       break;
   }
@@ -333,10 +351,10 @@ Bytes GigeCamera::Impl::packet_of(const Block& block, std::uint32_t packet) cons
   put16(out, block.number);
   put32(out, kind << 24 | packet);
   if (kind == 1) {
-    put32(out, 0x0001);  // an image
+    put32(out, block.chunks ? 0x4001 : 0x0001);  // an image, with chunks behind it
     put32(out, static_cast<std::uint32_t>(block.timestamp_ns >> 32));
     put32(out, static_cast<std::uint32_t>(block.timestamp_ns));
-    put32(out, options.format.pfnc);
+    put32(out, block.pfnc);
     put32(out, static_cast<std::uint32_t>(options.width));
     put32(out, static_cast<std::uint32_t>(options.height));
     for (int i = 0; i < 3; ++i) put32(out, 0);  // offsets, paddings
@@ -346,10 +364,43 @@ Bytes GigeCamera::Impl::packet_of(const Block& block, std::uint32_t packet) cons
     out.insert(out.end(), block.payload.begin() + static_cast<std::ptrdiff_t>(begin),
                block.payload.begin() + static_cast<std::ptrdiff_t>(end));
   } else {
-    put32(out, 0x0001);
+    put32(out, block.chunks ? 0x4001 : 0x0001);
     put32(out, static_cast<std::uint32_t>(options.height));
   }
   return out;
+}
+
+Block GigeCamera::Impl::next_frame_to_take(GigeShot& shot) {
+  Block block;
+  block.number = next_block;
+  next_block = next_block == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(next_block + 1);
+  block.timestamp_ns = clock_ns();
+  block.data_per_packet = (registers.read(gige::stream_packet_size).value_or(1400) & 0xFFFF) - gvsp_overhead;
+  block.payload.resize(registers.read(gige::payload_size).value_or(0));
+  block.chunks = registers.read(gige::chunk_mode) == 1U;
+  shot = {next_frame++, 1e-6 * registers.real(gige::exposure_us), registers.real(gige::gain_db), registers.response(),
+          registers.format()};
+  block.pfnc = shot.format.pfnc;
+  return block;
+}
+
+// GVSP §24: each chunk is its data, its identity, its length; the picture is the first.
+void GigeCamera::Impl::append_chunks(Block& block, std::size_t picture_bytes, const GigeShot& shot) {
+  Bytes chunks;
+  const auto end_chunk = [&](std::uint32_t identity, std::size_t size) {
+    put32(chunks, identity);
+    put32(chunks, static_cast<std::uint32_t>(size));
+  };
+  const auto put64 = [&](std::uint64_t value) {
+    put32(chunks, static_cast<std::uint32_t>(value >> 32));
+    put32(chunks, static_cast<std::uint32_t>(value));
+  };
+  end_chunk(gige_chunk::image, picture_bytes);
+  put64(block.timestamp_ns);
+  end_chunk(gige_chunk::timestamp, 8);
+  put64(std::bit_cast<std::uint64_t>(1e6 * shot.exposure_s));
+  end_chunk(gige_chunk::exposure_us, 8);
+  std::copy(chunks.begin(), chunks.end(), block.payload.begin() + static_cast<std::ptrdiff_t>(picture_bytes));
 }
 
 void GigeCamera::Impl::send_frames() {
@@ -370,17 +421,13 @@ void GigeCamera::Impl::send_frames() {
       next_at = Clock::now() + std::chrono::milliseconds(100);
       continue;
     }
-    Block block;
-    block.number = next_block;
-    next_block = next_block == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(next_block + 1);
-    block.timestamp_ns = clock_ns();
-    block.data_per_packet = (registers.read(gige::stream_packet_size).value_or(1400) & 0xFFFF) - gvsp_overhead;
-    block.payload.resize(registers.read(gige::payload_size).value_or(0));
-    const std::uint64_t frame = next_frame++;
+    GigeShot shot;
+    const auto sent = std::make_shared<Block>(next_frame_to_take(shot));
+    const std::size_t picture_bytes = registers.picture_bytes();
     lock.unlock();
-    fill(frame, block.payload);
+    expose(shot, std::span(sent->payload).first(picture_bytes));
+    if (sent->chunks) append_chunks(*sent, picture_bytes, shot);
     lock.lock();
-    const auto sent = std::make_shared<const Block>(std::move(block));
     recent.push_back(sent);
     if (recent.size() > kept_blocks) recent.pop_front();
     ++counts.frames;
@@ -404,7 +451,12 @@ void GigeCamera::Impl::send_frames() {
 }
 
 GigeCamera::GigeCamera(const GigeCameraOptions& options, Fill fill)
-    : impl_(std::make_unique<Impl>(options, std::move(fill))) {
+    : GigeCamera(options, Expose([fill = std::move(fill)](const GigeShot& shot, std::span<std::uint8_t> payload) {
+                   fill(shot.number, payload);
+                 })) {}
+
+GigeCamera::GigeCamera(const GigeCameraOptions& options, Expose expose)
+    : impl_(std::make_unique<Impl>(options, std::move(expose))) {
   impl_->answering = std::thread([this] { impl_->answer_commands(); });
   impl_->sending = std::thread([this] { impl_->send_frames(); });
 }

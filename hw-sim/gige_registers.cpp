@@ -17,73 +17,19 @@ namespace {
 constexpr std::uint32_t description_at = 0x10000;
 constexpr std::uint32_t first_writable_feature = 0x2000;
 
-std::string integer(const std::string& name, std::uint32_t address, const char* access) {
-  return fmt::format(
-      "<IntReg Name=\"{}\" "
-      "NameSpace=\"Standard\"><Address>0x{:x}</Address><Length>4</Length><AccessMode>{}</AccessMode>"
-      "<pPort>Device</pPort><Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>\n",
-      name, address, access);
-}
-
-std::string real(const std::string& name, std::uint32_t address, double low, double high) {
-  return fmt::format(
-      "<Float Name=\"{0}\" NameSpace=\"Standard\"><pValue>{0}Reg</pValue><Min>{2}</Min><Max>{3}</Max></Float>\n"
-      "<FloatReg Name=\"{0}Reg\" NameSpace=\"Custom\"><Address>0x{1:x}</Address><Length>8</Length>"
-      "<AccessMode>RW</AccessMode><pPort>Device</pPort><Endianess>BigEndian</Endianess></FloatReg>\n",
-      name, address, low, high);
-}
-
-std::string text(const std::string& name, std::uint32_t address, int length) {
-  return fmt::format(
-      "<StringReg Name=\"{}\" NameSpace=\"Standard\"><Address>0x{:x}</Address><Length>{}</Length>"
-      "<AccessMode>RO</AccessMode><pPort>Device</pPort></StringReg>\n",
-      name, address, length);
-}
-
-std::string choice(const std::string& name, const std::string& entry, std::uint32_t value, std::uint32_t address) {
-  return fmt::format(
-             "<Enumeration Name=\"{0}\" NameSpace=\"Standard\"><EnumEntry Name=\"{1}\" NameSpace=\"Standard\">"
-             "<Value>{2}</Value></EnumEntry><pValue>{0}Reg</pValue></Enumeration>\n",
-             name, entry, value) +
-         integer(name + "Reg", address, "RW");
-}
-
 }  // namespace
 
-std::string gige_description(const GigeCameraOptions& o) {
-  std::string xml =
-      "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n"
-      "<RegisterDescription ModelName=\"Simulated\" VendorName=\"Mirrorfield\" StandardNameSpace=\"None\" "
-      "SchemaMajorVersion=\"1\" SchemaMinorVersion=\"0\" SchemaSubMinorVersion=\"1\" MajorVersion=\"1\" "
-      "MinorVersion=\"0\" SubMinorVersion=\"0\" ToolTip=\"\" ProductGuid=\"0\" VersionGuid=\"0\" "
-      "xmlns=\"http://www.genicam.org/GenApi/Version_1_0\">\n"
-      "<Category Name=\"Root\" NameSpace=\"Standard\">";
-  for (const char* feature : {"DeviceVendorName", "DeviceModelName", "DeviceID", "Width", "Height", "PixelFormat",
-                              "PayloadSize", "AcquisitionMode", "AcquisitionStart", "AcquisitionStop", "TriggerMode",
-                              "ExposureTime", "Gain", "AcquisitionFrameRate"})
-    xml += fmt::format("<pFeature>{}</pFeature>", feature);
-  xml += "</Category>\n";
-  xml += text("DeviceVendorName", 0x48, 32) + text("DeviceModelName", 0x68, 32) + text("DeviceID", 0xD8, 16);
-  xml += integer("Width", gige::width, "RO") + integer("Height", gige::height, "RO");
-  xml += integer("PayloadSize", gige::payload_size, "RO");
-  xml += choice("PixelFormat", std::string(o.format.name), o.format.pfnc, gige::pixel_format);
-  xml += choice("AcquisitionMode", "Continuous", 0, gige::acquisition_mode);
-  xml += choice("TriggerMode", "Off", 0, gige::trigger_mode);
-  for (const auto& [name, value] : {std::pair{"AcquisitionStart", 1}, std::pair{"AcquisitionStop", 0}})
-    xml += fmt::format(
-        "<Command Name=\"{}\" NameSpace=\"Standard\"><pValue>AcquisitionReg</pValue><CommandValue>{}</CommandValue>"
-        "</Command>\n",
-        name, value);
-  xml += integer("AcquisitionReg", gige::acquisition, "RW");
-  xml += real("ExposureTime", gige::exposure_us, 1, 1e7) + real("Gain", gige::gain_db, 0, 24);
-  xml += real("AcquisitionFrameRate", gige::frame_rate_hz, 0.1, 1000);
-  return xml + "<Port Name=\"Device\" NameSpace=\"Standard\"/>\n</RegisterDescription>\n";
-}
-
-GigeRegisters::GigeRegisters(const GigeCameraOptions& o) {
+GigeRegisters::GigeRegisters(const GigeCameraOptions& o) : formats_(o.more_formats) {
+  formats_.insert(formats_.begin(), o.format);
   const std::string xml = gige_description(o);
   memory_.resize(description_at + (xml.size() + 3) / 4 * 4);
   std::copy(xml.begin(), xml.end(), memory_.begin() + description_at);
+  set_bootstrap(o);
+  set_text(0x0200, 512, fmt::format("Local:mirrorfield.xml;{:x};{:x}", description_at, xml.size()));
+  set_features(o);
+}
+
+void GigeRegisters::set_bootstrap(const GigeCameraOptions& o) {
   set(0x0000, 0x00010002U);  // GigE Vision 1.2
   set(0x0004, 0x80000001U);  // big-endian, UTF-8
   set(0x000C, 0x4D460001U);  // MAC, lower half
@@ -97,20 +43,29 @@ GigeRegisters::GigeRegisters(const GigeCameraOptions& o) {
   set_text(0x0068, 32, "Simulated");
   set_text(0x0088, 32, "1");
   set_text(0x00D8, 16, o.serial);
-  set_text(0x0200, 512, fmt::format("Local:mirrorfield.xml;{:x};{:x}", description_at, xml.size()));
   set(0x0600, 1U);           // network interfaces
   set(0x0904, 1U);           // stream channels
   set(0x0934, 0x00000007U);  // can concatenate, write memory, resend packets
   set(gige::heartbeat_timeout_ms, 3000U);
   set(gige::timestamp_frequency_low, 1'000'000'000U);
   set(gige::stream_packet_size, 1400U);
+}
+
+void GigeRegisters::set_features(const GigeCameraOptions& o) {
   set(gige::width, static_cast<std::uint32_t>(o.width));
   set(gige::height, static_cast<std::uint32_t>(o.height));
   set(gige::pixel_format, o.format.pfnc);
-  set(gige::payload_size, static_cast<std::uint32_t>(o.format.bytes_for(static_cast<std::size_t>(o.width) *
-                                                                        static_cast<std::size_t>(o.height))));
+  set(gige::payload_size, static_cast<std::uint32_t>(picture_bytes()));
   set(gige::exposure_us, 1e6 * o.exposure_s);
   set(gige::frame_rate_hz, o.frame_rate_hz);
+  set(gige::linlog_time_1, 1000U);
+  set(gige::linlog_time_2, 1000U);
+  set(gige::slope_count, 1U);
+  set(gige::slope_selector, 1U);
+  for (std::uint32_t knee = 0; knee < gige::most_slope_knees; ++knee) {
+    set(gige::slope_times + 8 * knee, 100.0);
+    set(gige::slope_levels + 8 * knee, 100.0);
+  }
 }
 
 std::optional<std::span<const std::uint8_t>> GigeRegisters::read(std::uint32_t address, std::size_t size) const {
@@ -128,12 +83,85 @@ std::optional<std::uint32_t> GigeRegisters::read(std::uint32_t address) const {
 bool GigeRegisters::write(std::uint32_t address, std::span<const std::uint8_t> bytes) {
   const bool bootstrap = address >= gige::heartbeat_timeout_ms && address + bytes.size() <= 0x1000;
   const bool feature = address >= first_writable_feature && address + bytes.size() <= description_at;
-  const bool fixed = address >= gige::width && address <= gige::payload_size;
   if (!(bootstrap || feature)) return false;
-  // The only value that there is may be written.
-  if (fixed) return std::equal(bytes.begin(), bytes.end(), memory_.begin() + address);
+  if (bytes.size() == 4 && !takes(address, std::uint32_t{bytes[0]} << 24 | std::uint32_t{bytes[1]} << 16 |
+                                               std::uint32_t{bytes[2]} << 8 | std::uint32_t{bytes[3]}))
+    return false;
   std::copy(bytes.begin(), bytes.end(), memory_.begin() + address);
+  limit_reals();
+  const std::size_t chunks = read(gige::chunk_mode) == 1U ? gige_chunk::bytes : 0;
+  set(gige::payload_size, static_cast<std::uint32_t>(picture_bytes() + chunks));
   return true;
+}
+
+// Integers beyond their limits are refused; real numbers are brought to theirs. Cameras do either.
+bool GigeRegisters::takes(std::uint32_t address, std::uint32_t value) const {
+  switch (address) {
+    case gige::width:
+    case gige::height:
+    case gige::payload_size:
+      return value == read(address);
+    case gige::pixel_format:
+      return std::any_of(formats_.begin(), formats_.end(), [&](const WireFormat& f) { return f.pfnc == value; });
+    case gige::linlog_value_1:
+    case gige::linlog_value_2:
+      return value <= 200;
+    case gige::linlog_time_1:
+    case gige::linlog_time_2:
+      return value <= 1000;
+    case gige::slope_count:
+    case gige::slope_selector:
+      return value >= 1 && value <= gige::most_slope_knees;
+    case gige::linlog_mode:
+    case gige::slope_mode:
+    case gige::ptp_enable:
+    case gige::chunk_mode:
+      return value <= 1;
+    case gige::ptp_status:
+    case gige::ptp_offset_ns:
+    case gige::ptp_offset_ns + 4:
+      return false;
+    default:
+      return true;
+  }
+}
+
+void GigeRegisters::limit_reals() {
+  const auto limit = [&](std::uint32_t address, double low, double high) {
+    const double value = real(address);
+    if (!(value >= low && value <= high)) set(address, value > high ? high : low);
+  };
+  limit(gige::exposure_us, 1, 1e7);
+  limit(gige::gain_db, 0, 24);
+  limit(gige::frame_rate_hz, 0.1, 1000);
+  for (std::uint32_t knee = 0; knee < gige::most_slope_knees; ++knee) {
+    limit(gige::slope_times + 8 * knee, 0, 100);
+    limit(gige::slope_levels + 8 * knee, 0, 100);
+  }
+}
+
+SensorResponse GigeRegisters::response() const {
+  SensorResponse response;
+  if (read(gige::linlog_mode) == 1U) {
+    const auto share = [&](std::uint32_t address, double whole) { return read(address).value_or(0) / whole; };
+    response = LinLogSensor{share(gige::linlog_value_1, 200), share(gige::linlog_value_2, 200),
+                            share(gige::linlog_time_1, 1000), share(gige::linlog_time_2, 1000)};
+  } else if (read(gige::slope_mode) == 1U) {
+    MultiSlopeSensor slopes;
+    for (std::uint32_t knee = 0; knee < read(gige::slope_count); ++knee)
+      slopes.knees.push_back({real(gige::slope_times + 8 * knee) / 100, real(gige::slope_levels + 8 * knee) / 100});
+    response = slopes;
+  }
+  return fault_of(response).empty() ? response : SensorResponse{};
+}
+
+WireFormat GigeRegisters::format() const {
+  return *std::find_if(formats_.begin(), formats_.end(),
+                       [&](const WireFormat& f) { return f.pfnc == read(gige::pixel_format); });
+}
+
+std::size_t GigeRegisters::picture_bytes() const {
+  return format().bytes_for(std::size_t{read(gige::width).value_or(0)} * read(gige::height).value_or(0));
 }
 
 void GigeRegisters::set(std::uint32_t address, std::uint32_t value) {

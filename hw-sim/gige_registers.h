@@ -8,6 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "common/sensor_response.h"
+#include "device/pixel_packing.h"
+
 namespace mf::sim {
 
 struct GigeCameraOptions;
@@ -33,7 +36,32 @@ inline constexpr std::uint32_t trigger_mode = 0x2018;
 inline constexpr std::uint32_t exposure_us = 0x2020;    // IEEE double
 inline constexpr std::uint32_t gain_db = 0x2028;        // IEEE double
 inline constexpr std::uint32_t frame_rate_hz = 0x2030;  // IEEE double
+
+inline constexpr std::uint32_t linlog_mode = 0x2040;     // 0 off, 1 user-defined
+inline constexpr std::uint32_t linlog_value_1 = 0x2044;  // 0 to 200, also value 2
+inline constexpr std::uint32_t linlog_value_2 = 0x2048;
+inline constexpr std::uint32_t linlog_time_1 = 0x204C;  // 0 to 1000 of the exposure time, also time 2
+inline constexpr std::uint32_t linlog_time_2 = 0x2050;
+inline constexpr std::uint32_t slope_mode = 0x2060;      // 0 off, 1 manual
+inline constexpr std::uint32_t slope_count = 0x2064;     // knees, 1 to most_slope_knees
+inline constexpr std::uint32_t slope_selector = 0x2068;  // 1 to most_slope_knees
+inline constexpr std::uint32_t slope_times = 0x2080;     // IEEE doubles, one a knee: % of the exposure
+inline constexpr std::uint32_t slope_levels = 0x20A0;    // IEEE doubles, one a knee: % of saturation
+inline constexpr int most_slope_knees = 3;
+inline constexpr std::uint32_t ptp_enable = 0x2100;
+inline constexpr std::uint32_t ptp_status = 0x2104;  // 0 disabled, 9 slave, after IEEE 1588's states
+inline constexpr std::uint32_t ptp_latch = 0x2108;
+inline constexpr std::uint32_t ptp_offset_ns = 0x2110;  // 64 bits, signed; as latched
+inline constexpr std::uint32_t chunk_mode = 0x2120;
 }  // namespace gige
+
+// The picture's identity, then timestamp and exposure time: what a frame ends with when chunks are on (big-endian).
+namespace gige_chunk {
+inline constexpr std::uint32_t image = 0x0000;
+inline constexpr std::uint32_t timestamp = 0x1001;     // 64 bits, ns
+inline constexpr std::uint32_t exposure_us = 0x1002;   // IEEE double
+inline constexpr std::uint32_t bytes = 3 * 8 + 8 + 8;  // of all of them, image apart
+}  // namespace gige_chunk
 
 // The camera's memory as a client sees it: bootstrap registers, our features, and the GenICam description. Big-endian.
 class GigeRegisters {
@@ -46,12 +74,22 @@ class GigeRegisters {
   // False outside the memory and for what a client may not write.
   [[nodiscard]] bool write(std::uint32_t address, std::span<const std::uint8_t> bytes);
 
+  // The response that is set; linear where what is set is no response.
+  [[nodiscard]] SensorResponse response() const;
+  [[nodiscard]] WireFormat format() const;
+  [[nodiscard]] std::size_t picture_bytes() const;  // of one frame in that format, chunks apart
+
   void set(std::uint32_t address, std::uint32_t value);
   void set(std::uint32_t address, double value);
   [[nodiscard]] double real(std::uint32_t address) const;
 
  private:
+  void set_bootstrap(const GigeCameraOptions&);
+  void set_features(const GigeCameraOptions&);
   void set_text(std::uint32_t address, std::size_t room, const std::string& text);
+  [[nodiscard]] bool takes(std::uint32_t address, std::uint32_t value) const;
+  void limit_reals();
+  std::vector<WireFormat> formats_;
   std::vector<std::uint8_t> memory_;
 };
 

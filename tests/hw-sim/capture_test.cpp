@@ -157,7 +157,7 @@ TEST(Capture, TagsAreWhereTruthSaysTheyAre) {
   const MotionInput input{cam_from_world.inverse().translation, scene.lamp.centre_in_world.cast<double>(),
                           plate.half_size_m()};
   const Rigid3 pose = mirror_pose(input, {0, 0, 0}, Eigen::Vector3d(-0.2, 0.3, 1).normalized(), 0.05);
-  const ImageF rgb = render(tracer, {camera, cam_from_world, pose, {0, 0, 512, 512}, 8, 1});
+  const ImageF rgb = render(tracer, {camera, cam_from_world, pose, {0, 0, 512, 512}, 8, 1, {}});
   ImageF green(512, 512, 1);
   for (std::size_t i = 0; i < green.data.size(); ++i) green.data[i] = rgb.data[3 * i + 1];
 

@@ -2,15 +2,18 @@
 // Our camera against Aravis' client, which is not ours: discovery, registers, stream, resend, heartbeat.
 #include "hw-sim/gige_camera.h"
 
+#include <arv.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <random>
 #include <thread>
 
 #include "common/error.h"
 #include "device/aravis_source.h"
 #include "device/capture.h"
+#include "hw-sim/gige_registers.h"
 #include "tests/device/scripted_camera.h"
 #include "tests/support/expect_input_error.h"
 #include "tests/support/temporary_folder.h"
@@ -113,6 +116,152 @@ TEST_F(GigeCameraTest, EveryPackingArrivesBitForBit) {
       }
     EXPECT_EQ(got, 3) << format;
   }
+}
+
+// A picture that tells the settings it was taken with, as its codes.
+void show_settings(const GigeShot& shot, std::span<std::uint8_t> payload) {
+  const std::size_t bytes = shot.format.packing == Packing::bytes ? 1 : 2;
+  const auto show = [&](std::size_t pixel, double value) {
+    const auto code = static_cast<unsigned>(std::lround(value));
+    payload[bytes * pixel] = static_cast<std::uint8_t>(code);
+    if (bytes == 2) payload[bytes * pixel + 1] = static_cast<std::uint8_t>(code >> 8);
+  };
+  show(0, static_cast<double>(shot.response.index()));
+  show(1, 1e4 * shot.exposure_s);
+  show(2, 10 * shot.gain_db);
+  if (const auto* slopes = std::get_if<MultiSlopeSensor>(&shot.response)) {
+    show(3, static_cast<double>(slopes->knees.size()));
+    show(4, 200 * slopes->knees.back().time);
+    show(5, 200 * slopes->knees.back().level);
+  } else if (const auto* linlog = std::get_if<LinLogSensor>(&shot.response)) {
+    show(3, 200 * linlog->value_1);
+    show(4, 200 * linlog->value_2);
+    show(5, 200 * linlog->time_1);
+  }
+}
+
+// The first codes of the last of some frames: those on their way still have the settings of before.
+std::vector<int> settled_codes(CameraSource& source) {
+  CameraFrame frame;
+  frame.codes = ImageU16(source.description().width, source.description().height, 1);
+  for (int i = 0, got = 0; i < 100 && got < 4; ++i)
+    got += source.receive(frame, milliseconds(100)) == Received::frame ? 1 : 0;
+  return {frame.codes.data.begin(), frame.codes.data.begin() + 6};
+}
+
+TEST_F(GigeCameraTest, AClientsResponseReachesThePictureAndIsReadBack) {
+  GigeCameraOptions o = camera("127.0.3.30", "Mono12", 64, 48);
+  o.frame_rate_hz = 100;
+  const GigeCamera server(o, GigeCamera::Expose(show_settings));
+  CameraSettings s = client(o);
+  s.exposure_s = 0.02;
+  s.gain_db = 6;
+  s.response = MultiSlopeSensor{{{0.9, 0.5}, {0.995, 0.75}}};
+  const std::unique_ptr<CameraSource> source = open_aravis_source(s);
+  const ResponseSetting& slopes = source->description().response;
+  EXPECT_EQ(slopes.scheme, "SFNC MultiSlope");
+  EXPECT_TRUE(slopes.remarks.empty()) << slopes.remarks.front();
+  EXPECT_EQ(std::get<MultiSlopeSensor>(slopes.in_force), std::get<MultiSlopeSensor>(*s.response));
+  source->start();
+  EXPECT_EQ(settled_codes(*source), (std::vector<int>{1, 200, 60, 2, 199, 150}));
+  // While it runs.
+  const ResponseSetting linlog =
+      apply_response(source->features(), ResponseRequest{LinLogSensor{0.7, 0.5, 0.85, 1}}, 0.02);
+  EXPECT_TRUE(linlog.remarks.empty()) << linlog.remarks.front();
+  EXPECT_EQ(std::get<LinLogSensor>(linlog.in_force), (LinLogSensor{0.7, 0.5, 0.85, 1}));
+  EXPECT_EQ(settled_codes(*source), (std::vector<int>{2, 200, 60, 140, 100, 170}));
+  // What the camera refuses, and what it clips.
+  EXPECT_NE(test::input_error_of([&] { source->features().set_number("LinLog_Value1", 201); }), "");
+  EXPECT_EQ(source->features().number("LinLog_Value1"), 140);
+  source->features().set_number("ExposureTime", 1e9);
+  EXPECT_EQ(source->features().number("ExposureTime"), 1e7);
+}
+
+TEST_F(GigeCameraTest, APixelFormatCanBeChosenFromSeveral) {
+  GigeCameraOptions o = camera("127.0.3.31", "Mono12", 64, 48);
+  o.more_formats = {wire_format("Mono8").value(), wire_format("BayerRG12p").value()};
+  o.frame_rate_hz = 60;
+  const GigeCamera server(o, [](std::uint64_t, std::span<std::uint8_t> payload) { fill(7, payload); });
+  for (const char* format : {"Mono8", "BayerRG12p", "Mono12"}) {
+    CameraSettings s = client(o);
+    s.pixel_format = format;
+    const std::unique_ptr<CameraSource> source = open_aravis_source(s);
+    EXPECT_EQ(source->description().wire_format, format);
+    source->start();
+    CameraFrame frame;
+    frame.codes = ImageU16(o.width, o.height, 1);
+    Received received = Received::nothing;
+    for (int i = 0; i < 20 && received != Received::frame; ++i) received = source->receive(frame, milliseconds(100));
+    ASSERT_EQ(received, Received::frame) << format;
+    GigeCameraOptions chosen = o;
+    chosen.format = wire_format(format).value();
+    EXPECT_EQ(frame.codes.data, codes_of(7, chosen)) << format;
+  }
+  CameraSettings s = client(o);
+  s.pixel_format = "Mono16";
+  EXPECT_TRUE(test::contains(test::input_error_of([&] { (void)open_aravis_source(s); }), "pixel_format"));
+}
+
+TEST_F(GigeCameraTest, PtpIsSwitchedOnAndReported) {
+  GigeCameraOptions o = camera("127.0.3.32", "Mono8", 64, 48);
+  o.ptp_offset_ns = -1234;
+  const GigeCamera server(o, fill);
+  CameraSettings s = client(o);
+  {
+    const std::unique_ptr<CameraSource> source = open_aravis_source(s);
+    EXPECT_TRUE(source->description().ptp.available);
+    EXPECT_FALSE(source->description().ptp.enabled);
+  }
+  s.ptp = true;
+  const std::unique_ptr<CameraSource> source = open_aravis_source(s);
+  const PtpReport& ptp = source->description().ptp;
+  EXPECT_TRUE(ptp.enabled);
+  EXPECT_EQ(ptp.status, "Slave");
+  EXPECT_EQ(ptp.offset_ns, -1234);
+  source->start();
+  CameraFrame frame;
+  frame.codes = ImageU16(o.width, o.height, 1);
+  Received received = Received::nothing;
+  for (int i = 0; i < 20 && received != Received::frame; ++i) received = source->receive(frame, milliseconds(100));
+  ASSERT_EQ(received, Received::frame);
+  // The camera's time is now the host's.
+  EXPECT_LT(std::abs(frame.arrival.realtime_ns - frame.arrival.device_ns), 1'000'000'000);
+}
+
+// Aravis' own parser reads the chunks.
+TEST_F(GigeCameraTest, ChunksTellTimeAndExposure) {
+  GigeCameraOptions o = camera("127.0.3.33", "Mono8", 322, 241);
+  o.frame_rate_hz = 60;
+  const GigeCamera server(o, fill);
+  ArvCamera* client = arv_camera_new(o.address.c_str(), nullptr);
+  ASSERT_NE(client, nullptr);
+  arv_camera_gv_set_stream_options(client, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  arv_camera_gv_set_packet_size(client, 1400, nullptr);
+  arv_camera_set_exposure_time(client, 4321, nullptr);
+  arv_camera_set_boolean(client, "ChunkModeActive", TRUE, nullptr);
+  EXPECT_EQ(arv_camera_get_payload(client, nullptr), 322U * 241U + gige_chunk::bytes);
+  ArvStream* stream = arv_camera_create_stream(client, nullptr, nullptr, nullptr);
+  ASSERT_NE(stream, nullptr);
+  for (int i = 0; i < 4; ++i)
+    arv_stream_push_buffer(stream, arv_buffer_new_allocate(arv_camera_get_payload(client, nullptr)));
+  arv_camera_start_acquisition(client, nullptr);
+  ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream, 2'000'000);
+  ASSERT_NE(buffer, nullptr);
+  ASSERT_EQ(arv_buffer_get_status(buffer), ARV_BUFFER_STATUS_SUCCESS);
+  ArvChunkParser* parser = arv_camera_create_chunk_parser(client);
+  EXPECT_DOUBLE_EQ(arv_chunk_parser_get_float_value(parser, buffer, "ChunkExposureTime", nullptr), 4321);
+  EXPECT_EQ(static_cast<std::uint64_t>(arv_chunk_parser_get_integer_value(parser, buffer, "ChunkTimestamp", nullptr)),
+            arv_buffer_get_timestamp(buffer));
+  std::size_t size = 0;
+  const auto* image = static_cast<const std::uint8_t*>(arv_buffer_get_image_data(buffer, &size));
+  std::vector<std::uint8_t> expected(322U * 241U);
+  fill(arv_buffer_get_frame_id(buffer), expected);
+  ASSERT_GE(size, expected.size());
+  EXPECT_TRUE(std::equal(expected.begin(), expected.end(), image));
+  g_object_unref(parser);
+  g_object_unref(buffer);
+  g_object_unref(stream);
+  g_object_unref(client);
 }
 
 TEST_F(GigeCameraTest, LostPacketsAreAskedForAgain) {
