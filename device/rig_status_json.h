@@ -25,7 +25,7 @@ namespace mf {
 [[nodiscard]] nlohmann::json rig_status_to_json(const RigStatus&);
 
 // Bounds of what is believed: a line that breaks one is refused.
-inline constexpr int most_preview_px = 2048;  // an edge
+inline constexpr int most_preview_px = 1024;  // an edge
 inline constexpr std::size_t most_status_tags = 1024;
 inline constexpr std::size_t most_status_patches = 16384;
 
