@@ -3,6 +3,7 @@
 
 #include <png.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -48,8 +49,9 @@ CoverageStatus half_covered() {
     for (int i = 0; i < around; ++i) {
       CoveragePatch patch{360.0 * (i + 0.5) / around, elevation, 1, 0};
       const double off_lamp = std::abs(patch.azimuth_deg - 250) + std::abs(elevation - 52);
-      if (off_lamp < 30) patch.weight = 20;
-      patch.covered = std::clamp(1.3 - std::abs(patch.azimuth_deg - 100) / 120, 0.0, 1.0);
+      if (off_lamp < 20) patch.weight = 20;
+      const double turned = std::remainder(patch.azimuth_deg - 100, 360);  // from what was seen first
+      patch.covered = std::clamp(1.4 - std::abs(turned) / 120 + elevation / 300, 0.0, 1.0);
       coverage.patches.push_back(patch);
     }
   }
@@ -93,10 +95,19 @@ ImageU8 grey_picture(const std::string& png_file) {
   png_image png{};
   png.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_file(&png, png_file.c_str()) == 0) return {};
-  png.format = PNG_FORMAT_GRAY;
-  ImageU8 grey(static_cast<int>(png.width), static_cast<int>(png.height), 1);
-  const bool read = png_image_finish_read(&png, nullptr, grey.data.data(), 0, nullptr) != 0;
-  return read ? grey : ImageU8{};
+  png.format = PNG_FORMAT_LINEAR_Y;
+  const int width = static_cast<int>(png.width), height = static_cast<int>(png.height);
+  ImageU16 codes(width, height, 1);
+  if (png_image_finish_read(&png, nullptr, codes.data.data(), 0, nullptr) == 0) return {};
+  std::vector<std::uint16_t> sorted = codes.data;
+  const auto bright = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 998 / 1000);
+  std::nth_element(sorted.begin(), bright, sorted.end());
+  ImageU8 grey(width, height, 1);
+  for (std::size_t i = 0; i < codes.data.size(); ++i) {
+    const double level = std::min(1.0, static_cast<double>(codes.data[i]) / std::max<double>(*bright, 1));
+    grey.data[i] = static_cast<std::uint8_t>(std::lround(255 * std::sqrt(level)));
+  }
+  return grey;
 }
 
 }  // namespace mf::test

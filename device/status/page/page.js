@@ -27,22 +27,23 @@ function minutes(s) { return s < 90 ? Math.floor(s) + " s" : s < 36000 ? Math.fl
 
 const titles = { idle: "READY", metering: "METERING", recording: "RECORDING", done: "DONE", error: "ERROR" };
 
-function banner(state, title, detail) {
+// The clock stands by itself: it changes every second, and is not to be spoken each time.
+function banner(state, title, detail, time) {
   byId("banner").dataset.state = state;
   say("state", title);
   say("detail", detail);
-  document.title = title + " – Mirrorfield";
+  say("clock", time || "");
+  const full = title + " – Mirrorfield";
+  if (document.title !== full) document.title = full;
 }
 
 function bannerOf(s) {
-  const time = s.seconds > 0 ? clock(s.seconds) : "";
-  const covered = s.coverage && s.coverage.done;
-  if (s.state === "idle") return banner("idle", titles.idle, "Press the button to record");
-  if (s.state === "metering") return banner("metering", titles.metering, "Hold the mirror still in the picture");
-  if (s.state === "recording")
-    return banner("recording", titles.recording + " " + time, covered ? "Enough is covered: you may stop" : "");
-  if (s.state === "done") return banner("done", titles.done, grouped(s.durable_frames) + " frames in " + time + ", all safe");
-  return banner("error", titles.error, "");
+  const time = s.seconds > 0 && s.state !== "idle" ? clock(s.seconds) : "";
+  const enough = s.coverage && s.coverage.done;
+  const details = { idle: "Press the button", metering: "Hold the mirror still in the picture",
+                    recording: enough ? "You may stop: hold the button" : "Move the mirror",
+                    done: grouped(s.durable_frames) + " frames, all safe", error: "" };
+  banner(s.state, titles[s.state], details[s.state], time);
 }
 
 function numbers(s) {
@@ -154,15 +155,15 @@ function goHere(pen, advice) {
   text(pen, "GO HERE", inside, y + below * 84, "800 42px system-ui, sans-serif");
 }
 
-function guidance(coverage) {
+function guidance(coverage, state) {
   byId("guidance").hidden = !coverage;
   if (!coverage) return;
   const percent = Math.round(100 * (coverage.covered || 0)) + " %";
   say("covered", percent);
-  say("advice", coverage.done ? "Enough is covered" : coverage.advice ? coverage.advice.text : "");
+  const advice = state === "recording" && !coverage.done ? coverage.advice : null;
+  say("advice", coverage.done ? "Enough is covered" : advice ? advice.text : "");
   const pen = byId("hemisphere").getContext("2d");
-  pen.fillStyle = "#ffffff";
-  pen.fillRect(0, 0, size, size);
+  pen.clearRect(0, 0, size, size);
   if (coverage.patches.length > 0) fillMosaic(pen, coverage.patches);
   pen.beginPath();
   pen.arc(middle, middle, radius, 0, 2 * Math.PI);
@@ -172,9 +173,9 @@ function guidance(coverage) {
   text(pen, "x", middle + radius + 30, middle, "700 40px system-ui, sans-serif");
   text(pen, "y", middle, middle - radius - 30, "700 40px system-ui, sans-serif");
   brightLights(pen, coverage.patches);
-  if (coverage.advice && !coverage.done) goHere(pen, coverage.advice);
-  const label = percent + " of the light is covered" + (coverage.advice ? "; go to azimuth " +
-    Math.round(coverage.advice.azimuth_deg) + "°, elevation " + Math.round(coverage.advice.elevation_deg) + "°" : "");
+  if (advice) goHere(pen, advice);
+  const label = percent + " of the light is covered" + (advice ? "; go to azimuth " + Math.round(advice.azimuth_deg) +
+    "°, elevation " + Math.round(advice.elevation_deg) + "°" : "");
   if (byId("hemisphere").getAttribute("aria-label") !== label) byId("hemisphere").setAttribute("aria-label", label);
 }
 
@@ -242,10 +243,12 @@ function show() {
   const cut = !latest || away > 4;
   const stale = cut || !latest.connected || quiet > 4;
   document.body.classList.toggle("stale", stale);
-  if (cut) banner("offline", heard ? "NO CONNECTION" : "CONNECTING", heard ? "The rig has not answered for " + Math.floor(away) + " s" : "");
-  else if (!latest.connected) banner("offline", "RECORDER OFF", "The page works, the recorder does not answer");
+  const ago = (seconds) => Math.floor(seconds) + " s";
+  if (cut && !heard) banner("offline", "CONNECTING", "");
+  else if (cut) banner("offline", "NO CONNECTION", "The rig does not answer", ago(away));
+  else if (!latest.connected) banner("offline", "RECORDER OFF", "");
   else if (!latest.status) banner("offline", "WAITING", "The recorder has said nothing yet");
-  else if (quiet > 4) banner("offline", "NO NEWS", "The recorder has been silent for " + Math.floor(quiet) + " s");
+  else if (quiet > 4) banner("offline", "NO NEWS", "The recorder is silent", ago(quiet));
   else bannerOf(latest.status);
   const problem = cut ? "" : latest.connected ? (latest.status ? latest.status.problem : "") : latest.problem;
   say("problem", problem || "");
@@ -258,7 +261,7 @@ function onStatus(event) {
   show();
   if (latest.status) {
     numbers(latest.status);
-    guidance(latest.status.coverage);
+    guidance(latest.status.coverage, latest.status.state);
     if (!latest.status.preview) say("tags", preview ? "paused" : "");
   }
   startPanel();
