@@ -6,6 +6,7 @@
 
 #include "device/camera_source.h"
 #include "device/recorder.h"
+#include "device/status_config.h"
 
 namespace mf {
 
@@ -18,6 +19,7 @@ struct DeviceConfig {
   double black_level_hint = 0;                 // code
   std::filesystem::path recordings;            // sessions are made below it
   RecorderOptions recorder;
+  StatusConfig status;
 };
 
 // Throws InputError naming the file and the key: no TOML, an unknown key, a wrong type or range, a missing one.

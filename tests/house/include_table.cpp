@@ -40,7 +40,7 @@ bool contains(const Names& names, std::string_view name) {
 // The C++ standard library has no dots in its names; of POSIX and Linux, these folders and these files.
 bool is_system_header(std::string_view header) {
   static const Names posix{"sys/",      "netinet/", "arpa/",    "net/",     "unistd.h",  "fcntl.h",  "poll.h",
-                           "pthread.h", "netdb.h",  "signal.h", "dirent.h", "termios.h", "endian.h", "ifaddrs.h"};
+                           "pthread.h", "netdb.h",  "signal.h", "dirent.h", "termios.h", "endian.h", "ifaddrs.h", "grp.h"};
   return header.find('.') == std::string_view::npos || starts_with_any(header, posix);
 }
 
@@ -114,7 +114,10 @@ const std::vector<FolderRule>& include_table() {
       {"common/", {}, vocabulary + Names{"SQLite", "TIFF", "ISA-L", "AprilTag"}},
       {"common/command_line/", {}, Names{"fmt", "CLI11"}},
       {"device/", {"common/"}, vocabulary + Names{"Aravis", "V4L2", "libusb", "libevdev", "libudev", "systemd"}},
-      {"device/status/", {"common/", "device/rig_status.h", "device/status_socket.h"}, vocabulary + Names{"microhttpd"}},
+      // A program of its own: of the daemon it knows what crosses the socket, and its table of the config.
+      {"device/status/",
+       {"common/", "device/rig_status", "device/status_socket.h", "device/status_config.h", "device/owned_fd.h"},
+       vocabulary + Names{"microhttpd"}},
       // The simulator writes the import format: frames as PNG, truth as EXR, tags as AprilTag draws them.
       {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
