@@ -99,9 +99,7 @@ bool SimulatedButton::Impl::answer(UMockdevIoctlClient* client) {
   } else if (number == _IOC_NR(EVIOCGBIT(0, 0))) {
     set_bit(bytes, EV_SYN);
     set_bit(bytes, EV_KEY);
-  } else if (number == _IOC_NR(EVIOCGBIT(EV_KEY, 0))) {
-    set_bit(bytes, options.key);
-  } else if (number == _IOC_NR(EVIOCGKEY(0)) && pressed) {
+  } else if (number == _IOC_NR(EVIOCGBIT(EV_KEY, 0)) || (number == _IOC_NR(EVIOCGKEY(0)) && pressed)) {
     set_bit(bytes, options.key);
   }
   reply(client, bytes);  // all else: it has none of that

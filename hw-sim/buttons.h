@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-using UMockdevTestbed = struct _UMockdevTestbed;  // of umockdev.h
+using UMockdevTestbed = struct _UMockdevTestbed;  // of umockdev.h  NOLINT(bugprone-reserved-identifier)
 
 namespace mf::sim {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-using UMockdevTestbed = struct _UMockdevTestbed;  // of umockdev.h
+using UMockdevTestbed = struct _UMockdevTestbed;  // of umockdev.h  NOLINT(bugprone-reserved-identifier)
 
 namespace mf::sim {
 
