@@ -97,6 +97,7 @@ const std::vector<Library>& known_libraries() {
       {"Aravis", {"arv.h", "aravis"}},
       {"V4L2", {"linux/videodev2.h", "linux/v4l2"}},
       {"libusb", {"libusb"}},
+      {"usbfs", {"linux/usbdevice_fs.h"}},
       {"libevdev", {"libevdev/", "linux/input"}},
       {"libudev", {"libudev.h"}},
       {"systemd", {"systemd/"}},
@@ -119,7 +120,7 @@ const std::vector<FolderRule>& include_table() {
        {"common/", "device/rig_status", "device/status_socket.h", "device/status_config.h", "device/owned_fd.h"},
        vocabulary + Names{"microhttpd"}},
       // The simulator writes the import format: frames as PNG, truth as EXR, tags as AprilTag draws them.
-      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev"}},
+      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev", "usbfs"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
