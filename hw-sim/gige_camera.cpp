@@ -143,6 +143,7 @@ struct GigeCamera::Impl {
   void boot();
 
   void send_frames();
+  void send_packets(const Block&, std::unique_lock<std::mutex>& lock);
   [[nodiscard]] Block next_frame_to_take(GigeShot&);
   static void append_chunks(Block&, std::size_t picture_bytes, const GigeShot&);
   [[nodiscard]] Bytes packet_of(const Block&, std::uint32_t packet) const;
@@ -170,6 +171,9 @@ struct GigeCamera::Impl {
   std::uint16_t next_block = 1;
   GigeCameraCounts counts;
   std::mt19937_64 losses;
+  double packet_loss = options.packet_loss;
+  double jitter_s = 0;
+  int skipping = 0;
 
   std::thread answering;
   std::thread sending;
@@ -403,9 +407,30 @@ void GigeCamera::Impl::append_chunks(Block& block, std::size_t picture_bytes, co
   std::copy(chunks.begin(), chunks.end(), block.payload.begin() + static_cast<std::ptrdiff_t>(picture_bytes));
 }
 
+// `lock` is held on entry and on return.
+void GigeCamera::Impl::send_packets(const Block& block, std::unique_lock<std::mutex>& lock) {
+  std::uniform_real_distribution<double> chance;
+  const Clock::time_point begun = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                                     std::chrono::duration<double>(jitter_s * chance(losses)));
+  changed.wait_until(lock, begun, [&] { return ending; });
+  for (std::uint32_t packet = 0; packet <= block.data_packets() + 1 && streaming(); ++packet) {
+    ++counts.packets;
+    if (chance(losses) < packet_loss) {
+      ++counts.dropped;
+      continue;
+    }
+    lock.unlock();
+    stream.send(packet_of(block, packet), destination);
+    // No faster than the wire that a camera has: a burst would overflow buffers that hold on location.
+    if (packet % packets_in_a_row == 0)
+      std::this_thread::sleep_until(begun + std::chrono::nanoseconds(packet * (block.data_per_packet + gvsp_overhead) *
+                                                                     1'000'000'000 / wire_bytes_per_s));
+    lock.lock();
+  }
+}
+
 void GigeCamera::Impl::send_frames() {
   std::unique_lock lock(mutex);
-  std::uniform_real_distribution<double> chance;
   Clock::time_point next_at = Clock::now();
   while (true) {
     if (!ending && !streaming()) {
@@ -424,6 +449,10 @@ void GigeCamera::Impl::send_frames() {
     GigeShot shot;
     const auto sent = std::make_shared<Block>(next_frame_to_take(shot));
     const std::size_t picture_bytes = registers.picture_bytes();
+    if (skipping > 0) {
+      --skipping;
+      continue;
+    }
     lock.unlock();
     expose(shot, std::span(sent->payload).first(picture_bytes));
     if (sent->chunks) append_chunks(*sent, picture_bytes, shot);
@@ -431,22 +460,7 @@ void GigeCamera::Impl::send_frames() {
     recent.push_back(sent);
     if (recent.size() > kept_blocks) recent.pop_front();
     ++counts.frames;
-    const Clock::time_point begun = Clock::now();
-    for (std::uint32_t packet = 0; packet <= sent->data_packets() + 1 && streaming(); ++packet) {
-      ++counts.packets;
-      if (chance(losses) < options.packet_loss) {
-        ++counts.dropped;
-        continue;
-      }
-      lock.unlock();
-      stream.send(packet_of(*sent, packet), destination);
-      // No faster than the wire that a camera has: a burst would overflow buffers that hold on location.
-      if (packet % packets_in_a_row == 0)
-        std::this_thread::sleep_until(begun +
-                                      std::chrono::nanoseconds(packet * (sent->data_per_packet + gvsp_overhead) *
-                                                               1'000'000'000 / wire_bytes_per_s));
-      lock.lock();
-    }
+    send_packets(*sent, lock);
   }
 }
 
@@ -481,6 +495,21 @@ void GigeCamera::revive() {
   const std::lock_guard lock(impl_->mutex);
   impl_->boot();
   impl_->alive = true;
+}
+
+void GigeCamera::set_packet_loss(double share) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->packet_loss = share;
+}
+
+void GigeCamera::set_jitter(double most_s) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->jitter_s = most_s;
+}
+
+void GigeCamera::skip_frames(int count) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->skipping += count;
 }
 
 GigeCameraCounts GigeCamera::counts() const {

@@ -70,6 +70,12 @@ class GigeCamera {
   void die();
   void revive();
 
+  // From the next frame on, until another is set.
+  void set_packet_loss(double share);
+  void set_jitter(double most_s);  // each frame leaves late by up to this
+  // So many frames are taken and numbered, but never sent.
+  void skip_frames(int count);
+
   [[nodiscard]] GigeCameraCounts counts() const;
 
  private:

@@ -4,12 +4,16 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
+#include <string_view>
 #include <thread>
+#include <vector>
 
 #include "common/command_line/command_line.h"
 #include "common/error.h"
 #include "hw-sim/capture.h"
+#include "hw-sim/scenario_run.h"
 #include "hw-sim/session_camera.h"
 
 namespace {
@@ -85,6 +89,48 @@ void add_camera_command(mf::CommandLine& program, CameraArguments& a) {
   });
 }
 
+struct PlayArguments {
+  std::filesystem::path scenario;
+  std::filesystem::path out = "scenario";
+};
+
+// The button is an input device below umockdev: this program and the daemon look for it through its library.
+void run_with_umockdev(char** argv) {
+  if (mf::sim::runs_with_umockdev()) return;
+  ::setenv("LD_PRELOAD", mf::sim::umockdev_library, 1);
+  ::execv("/proc/self/exe", argv);
+  throw mf::InputError(mf::sim::umockdev_library, "", "cannot be preloaded: install the package umockdev");
+}
+
+void play_scenario(const PlayArguments& a) {
+  const mf::sim::Scenario scenario = mf::sim::read_scenario(a.scenario);
+  const auto start = std::chrono::steady_clock::now();
+  const auto say = [&](const std::string& what) {
+    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
+    fmt::print("{:7.2f} s  {}\n", since.count(), what);
+    std::fflush(stdout);
+  };
+  const std::filesystem::path daemon = std::filesystem::read_symlink("/proc/self/exe").parent_path() / "mirrorfieldd";
+  const mf::sim::ScenarioResult r =
+      run_scenario(scenario, {a.out, daemon}, isatty(STDERR_FILENO) != 0 ? show_progress : mf::Progress{}, say);
+  fmt::print("{}: {} frames, {} missing in {} gaps; the first durable {:.2f} s after the press\n", r.session.string(),
+             r.last.durable_frames, r.last.lost_frames, r.last.gaps, r.first_durable_s);
+  if (r.daemon_exit_code != 0)
+    throw mf::InputError("mirrorfieldd", "", fmt::format("ended with exit code {}", r.daemon_exit_code));
+}
+
+void add_play_command(mf::CommandLine& program, PlayArguments& a, char** argv) {
+  mf::CommandLine command = program.command(
+      "play",
+      "start camera, button and daemon after a scenario, and record; `mirrorfield-sim FILE.toml` is short for it");
+  command.option("scenario", a.scenario, "TOML (docs/simulator.md)", mf::Presence::required);
+  command.option("-o,--out", a.out, "folder to create: the session, and truth/ beside it");
+  command.on_run([&a, argv] {
+    run_with_umockdev(argv);
+    play_scenario(a);
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -94,6 +140,11 @@ int main(int argc, char** argv) {
   std::filesystem::path out;
   CameraArguments camera;
   add_capture_command(program, options, out);
+  PlayArguments play;
   add_camera_command(program, camera);
-  return program.run(argc, argv);
+  add_play_command(program, play, argv);
+  std::vector<char*> words(argv, argv + argc);
+  std::string command = "play";
+  if (argc > 1 && std::string_view(argv[1]).ends_with(".toml")) words.insert(words.begin() + 1, command.data());
+  return program.run(static_cast<int>(words.size()), words.data());
 }

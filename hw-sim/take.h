@@ -15,18 +15,18 @@
 namespace mf::sim {
 
 struct TakeOptions {
-  int frames = 120;           // of the waving mirror, ≥ 10
-  int samples = 5;            // paths a pixel in frames, ≥ 1
-  int scene_samples = 48;     // and in the picture of the scene without the mirror
-  double blur = 0;            // share of the time between two frames in which the shutter is open, 0 to 1: motion blur
+  int frames = 120;        // of the waving mirror, ≥ 10
+  int samples = 5;         // paths a pixel in frames, ≥ 1
+  int scene_samples = 48;  // and in the picture of the scene without the mirror
+  double blur = 0;         // share of the time between two frames in which the shutter is open, 0 to 1: motion blur
   std::uint64_t seed = 1;
 
   // What is wrong, or nothing.
   [[nodiscard]] std::optional<std::string> validate() const;
 };
 
-// What the rig's camera sees of one waving of the mirror, as light, before any sensor: traced once, then exposed as often
-// as a camera sends it. Frame −1 is the scene without the mirror.
+// What the rig's camera sees of one waving of the mirror, as light, before any sensor: traced once, then exposed as
+// often as a camera sends it. Frame −1 is the scene without the mirror.
 class Take {
  public:
   // Throws InputError for options that are wrong.

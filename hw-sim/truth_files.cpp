@@ -100,12 +100,12 @@ void write_world(const fs::path& folder, const WorldTarget& world) {
 }
 
 void write_truth(const fs::path& truth, const DeskRig& rig, const std::vector<Rigid3>& poses,
-                 const ResponseCurve& response, const ImageF& plate, const TruthOptions& options,
+                 const std::optional<ResponseCurve>& response, const ImageF& plate, const TruthOptions& options,
                  const Progress& progress) {
   fs::create_directories(truth);
   write_rgb_exr(truth / "plate0.exr", plate);
   write_true_calibration(truth, rig, poses);
-  write_true_response(truth, response);
+  if (response) write_true_response(truth, *response);
   write_true_pictures(truth, rig, options, progress);
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "common/progress.h"
@@ -22,9 +23,9 @@ struct TruthOptions {
 };
 
 // What only a simulation knows, as files in the folder `truth`: calibration.json (K, cam_from_world, and
-// world_from_mirror frame by frame), response.json, views.json, plateN.exr, knot.obj, knotN.exr,
+// world_from_mirror frame by frame), response.json (when it is given), views.json, plateN.exr, knot.obj, knotN.exr,
 // probe_0_0_0.1.exr. `plate` is the rig's own view without the mirror, traced already.
 void write_truth(const std::filesystem::path& truth, const DeskRig&, const std::vector<Rigid3>& poses,
-                 const ResponseCurve&, const ImageF& plate, const TruthOptions&, const Progress&);
+                 const std::optional<ResponseCurve>&, const ImageF& plate, const TruthOptions&, const Progress&);
 
 }  // namespace mf::sim
