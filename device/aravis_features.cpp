@@ -8,7 +8,10 @@
 namespace mf {
 
 bool AravisFeatures::has(const std::string& feature) const {
-  return arv_device_is_feature_available(device_, feature.c_str(), nullptr) != 0;
+  // One description serves many models: what it has in it, this camera need not have implemented. Aravis' own
+  // "available" does not ask for that.
+  return arv_device_is_feature_implemented(device_, feature.c_str(), nullptr) != 0 &&
+         arv_device_is_feature_available(device_, feature.c_str(), nullptr) != 0;
 }
 
 double AravisFeatures::number(const std::string& feature) const {
