@@ -24,6 +24,7 @@
 #include "common/error.h"
 #include "device/peer_identity.h"
 #include "device/rig_status_json.h"
+#include "device/status_command.h"
 
 namespace mf {
 
@@ -89,22 +90,6 @@ OwnedFd listen_at(const StatusSocketOptions& options, std::optional<gid_t> group
 std::string answer_line(const std::string& refusal) {
   const nlohmann::json answer{{"answer", "start"}, {"accepted", refusal.empty()}, {"reason", refusal}};
   return answer.dump() + "\n";
-}
-
-// The command's token, or why it is none.
-struct ReadCommand {
-  std::optional<std::string> token;
-  std::string fault;
-};
-
-ReadCommand read_command(const std::string& line) {
-  const nlohmann::json said = nlohmann::json::parse(line, nullptr, false);
-  if (said.is_discarded() || !said.is_object()) return {std::nullopt, "that is no JSON object"};
-  const auto command = said.find("command");
-  if (command == said.end() || *command != "start") return {std::nullopt, "the only command is start"};
-  const auto token = said.find("token");
-  if (token == said.end() || !token->is_string()) return {std::nullopt, "start needs a token, a text"};
-  return {token->get<std::string>(), {}};
 }
 
 struct StatusClient {
@@ -250,8 +235,8 @@ void StatusSocket::Server::take_lines(StatusClient& client) {
   std::size_t begin = 0;
   for (std::size_t end = client.received.find('\n'); end != std::string::npos;
        end = client.received.find('\n', begin)) {
-    const ReadCommand command = read_command(client.received.substr(begin, end - begin));
-    const std::string refusal = command.token ? hand_on(client, *command.token) : command.fault;
+    const StatusCommand command = read_status_command(std::string_view(client.received).substr(begin, end - begin));
+    const std::string refusal = command.start_token ? hand_on(client, *command.start_token) : command.fault;
     client.answers += answer_line(refusal);
     begin = end + 1;
   }

@@ -42,6 +42,7 @@ RigLink::~RigLink() {
 
 void RigLink::start(std::function<void(const RigNews&)> on_news) {
   on_news_ = std::move(on_news);
+  on_news_(news_);
   thread_ = std::thread([this] { run(); });
 }
 
@@ -70,7 +71,6 @@ bool RigLink::request_start(const std::string& token) {
 }
 
 void RigLink::run() {
-  on_news_(news_);
   while (true) {
     {
       const std::scoped_lock hold(mutex_);

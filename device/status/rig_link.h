@@ -47,7 +47,7 @@ class RigLink {
   RigLink& operator=(const RigLink&) = delete;
   ~RigLink();
 
-  // `on_news` runs in that thread, and not after stop(). Once.
+  // Once. `on_news` runs here for what is known now, later in that thread, and not after stop().
   void start(std::function<void(const RigNews&)> on_news);
   void stop();
   // False: the daemon is not there. The answer is news.
