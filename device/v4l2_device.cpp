@@ -8,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 
 #include "common/error.h"
 
@@ -29,10 +30,18 @@ std::string busy_remedy(const std::string& node) {
   throw InputError(node, "address", fmt::format("cannot be opened ({}): {}", std::strerror(error), remedy));
 }
 
+// A node that is not there is never opened: a lost camera is looked for several times a second.
+std::string followed(const std::string& node) {
+  std::error_code error;
+  const std::filesystem::path target = std::filesystem::canonical(node, error);
+  if (error) cannot_open(node, error.value());
+  return target.string();
+}
+
 }  // namespace
 
 V4l2Device::V4l2Device(const std::string& node)
-    : node_(node), descriptor_(::open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)) {
+    : node_(node), target_(followed(node)), descriptor_(::open(target_.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)) {
   if (descriptor_ < 0) cannot_open(node, errno);
 }
 

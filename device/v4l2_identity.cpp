@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
+#include <sstream>
 #include <string_view>
 
 #include "common/error.h"
@@ -56,18 +57,16 @@ v4l2_capability capability_of(const V4l2Device& device) {
 // What udev adds: maker, serial number, lasting name.
 void add_from_udev(FoundCamera& camera, const V4l2Device& device) {
   struct stat status {};
-  if (::fstat(device.descriptor(), &status) != 0) return;
+  if (::stat(device.target().c_str(), &status) != 0) return;
   const UdevPointer<udev> context(udev_new());
   if (context == nullptr) return;
   const UdevPointer<udev_device> known(udev_device_new_from_devnum(context.get(), 'c', status.st_rdev));
   if (known == nullptr) return;
   if (std::string vendor = property(known.get(), "ID_VENDOR"); !vendor.empty()) camera.vendor = std::move(vendor);
   camera.serial = property(known.get(), "ID_SERIAL_SHORT");
-  udev_list_entry* link = nullptr;
-  udev_list_entry_foreach(link, udev_device_get_devlinks_list_entry(known.get())) {
-    const std::string_view name = udev_list_entry_get_name(link);
-    if (name.starts_with("/dev/v4l/by-id/")) camera.name = name;
-  }
+  std::istringstream links(property(known.get(), "DEVLINKS"));
+  for (std::string link; links >> link;)
+    if (link.starts_with("/dev/v4l/by-id/")) camera.name = link;
 }
 
 }  // namespace
@@ -76,7 +75,7 @@ FoundCamera identify_v4l2_camera(const V4l2Device& device) {
   const v4l2_capability capability = capability_of(device);
   FoundCamera camera;
   camera.name = device.node();
-  camera.address = device.node();
+  camera.address = device.target();
   camera.vendor = fixed_text(capability.driver);
   camera.model = fixed_text(capability.card);
   add_from_udev(camera, device);

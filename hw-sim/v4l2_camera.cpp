@@ -8,6 +8,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <filesystem>
 #include <fstream>
 #include <list>
 #include <mutex>
@@ -106,14 +107,17 @@ std::string sysfs_path(const V4l2CameraOptions& o) {
   return "/devices/platform/mirrorfield-sim/video4linux/" + name_of(o);
 }
 
+std::string lasting_name(const V4l2CameraOptions& o) {
+  return fmt::format("v4l/by-id/mirrorfield-{}-video-index0", o.serial);
+}
+
 // In umockdev's own format: what sysfs and udev tell of the device, and a plain file as its node.
 std::string description(const V4l2CameraOptions& o) {
   return fmt::format(
-      "P: {0}\nN: {1}=00\nS: v4l/by-id/mirrorfield-{3}-video-index0\nE: DEVNAME=/dev/{1}\n"
-      "E: DEVLINKS=/dev/v4l/by-id/mirrorfield-{3}-video-index0\nE: MAJOR=81\nE: MINOR={4}\n"
+      "P: {0}\nN: {1}=00\nS: {5}\nE: DEVNAME=/dev/{1}\nE: DEVLINKS=/dev/{5}\nE: MAJOR=81\nE: MINOR={4}\n"
       "E: SUBSYSTEM=video4linux\nE: ID_VENDOR=Mirrorfield\nE: ID_SERIAL_SHORT={3}\nE: ID_V4L_CAPABILITIES=:capture:\n"
       "A: dev=81:{4}\nA: index=0\nA: name={2}\n\n",
-      sysfs_path(o), name_of(o), o.card, o.serial, o.number);
+      sysfs_path(o), name_of(o), o.card, o.serial, o.number, lasting_name(o));
 }
 
 [[noreturn]] void refuse(const std::string& node, GError* error) {
@@ -162,6 +166,7 @@ struct V4l2Camera::Impl {
       : testbed(t), options(o), fill(std::move(f)), driver(o, root_of(t) + node_of(o)) {}
   static void attach(const Shared&);
   void plug();
+  void pull();
   void take(UMockdevIoctlClient*);
   void run();
   void serve_waiting();
@@ -172,10 +177,12 @@ struct V4l2Camera::Impl {
     return 1;
   }
   static void on_connected(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
-    connect(client, "notify::connected", G_CALLBACK(on_disconnected), *static_cast<Shared*>(self));
+    (*static_cast<Shared*>(self))->driver.client_came(client);
+    g_object_weak_ref(G_OBJECT(client), on_gone, new Shared(*static_cast<Shared*>(self)));
   }
-  static void on_disconnected(UMockdevIoctlClient* client, GParamSpec*, gpointer self) {
-    (*static_cast<Shared*>(self))->driver.client_gone(client);
+  static void on_gone(gpointer self, GObject* client) {
+    const std::unique_ptr<Shared> shared(static_cast<Shared*>(self));
+    (*shared)->driver.client_gone(client);
   }
   static void end_sharing(gpointer self, GClosure*) { delete static_cast<Shared*>(self); }
   static void connect(gpointer object, const char* signal, GCallback callback, const Shared& self) {
@@ -197,6 +204,15 @@ void V4l2Camera::Impl::plug() {
   if (umockdev_testbed_add_from_string(testbed, description(options).c_str(), &error) == 0)
     refuse(node_of(options), error);
   plugged = true;
+}
+
+void V4l2Camera::Impl::pull() {
+  plugged = false;
+  const std::string path = "/sys" + sysfs_path(options);
+  umockdev_testbed_uevent(testbed, path.c_str(), "remove");
+  umockdev_testbed_remove_device(testbed, path.c_str());
+  std::filesystem::remove(root_of(testbed) + "/dev/" + lasting_name(options));  // umockdev forgets the link
+  driver.unplug();
 }
 
 void V4l2Camera::Impl::take(UMockdevIoctlClient* client) {
@@ -251,13 +267,13 @@ void V4l2Camera::Impl::run() {
 V4l2Camera::V4l2Camera(UMockdevTestbed* testbed, const V4l2CameraOptions& options, Fill fill) {
   require_camera(options);
   impl_ = std::make_shared<Impl>(testbed, options, std::move(fill));
-  impl_->plug();
   Impl::attach(impl_);
+  impl_->plug();
   impl_->clock = std::thread([this] { impl_->run(); });
 }
 
 V4l2Camera::~V4l2Camera() {
-  unplug();
+  if (impl_->plugged) impl_->pull();
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->ending = true;
@@ -270,10 +286,7 @@ V4l2Camera::~V4l2Camera() {
 }
 
 void V4l2Camera::unplug() {
-  if (!std::exchange(impl_->plugged, false)) return;
-  umockdev_testbed_uevent(impl_->testbed, ("/sys" + sysfs_path(impl_->options)).c_str(), "remove");
-  umockdev_testbed_remove_device(impl_->testbed, ("/sys" + sysfs_path(impl_->options)).c_str());
-  impl_->driver.unplug();
+  if (impl_->plugged) impl_->pull();
 }
 
 void V4l2Camera::replug() {

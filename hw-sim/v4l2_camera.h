@@ -55,6 +55,9 @@ struct V4l2CameraCounts {
 // the testbed sets. The node is a plain file that holds the frames, so clients can map it; poll() on a plain file is
 // always ready, so a DQBUF waits up to 20 ms for a frame before it says EAGAIN.
 //
+// umockdev 0.17 counts an open() that fails as an open file for ever, and ends the process at the fiftieth: look for a
+// node before opening it.
+//
 // umockdev does not tell when a client dies within an ioctl. A client that has not asked anything for a second loses
 // the camera to the next that wants it.
 class V4l2Camera {

@@ -19,7 +19,6 @@ namespace mf::sim {
 namespace {
 
 constexpr std::uint32_t capture = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-constexpr std::int64_t client_patience_ns = 1'000'000'000;
 
 template <typename T>
 T& as(void* argument) {
@@ -67,8 +66,6 @@ void V4l2Driver::set(bool& flag, bool value) {
 int V4l2Driver::handle(Client client, std::uint32_t request, void* argument) {
   const std::lock_guard lock(mutex_);
   if (std::find(gone_.begin(), gone_.end(), client) != gone_.end()) return ENODEV;
-  if (std::find(open_.begin(), open_.end(), client) == open_.end()) open_.push_back(client);
-  if (client == owner_) owner_seen_ns_ = clock_ns(CLOCK_MONOTONIC);
   switch (request) {
     case VIDIOC_REQBUFS:
     case VIDIOC_QUERYBUF:
@@ -269,9 +266,7 @@ int V4l2Driver::input(v4l2_input& i) const {
 }
 
 bool V4l2Driver::occupied_for(Client client) const {
-  if (busy_) return true;
-  const bool other = owner_ != nullptr && owner_ != client;
-  return other && clock_ns(CLOCK_MONOTONIC) - owner_seen_ns_ < client_patience_ns;
+  return busy_ || (owner_ != nullptr && owner_ != client);
 }
 
 void V4l2Driver::release() {
@@ -298,7 +293,6 @@ int V4l2Driver::request_buffers(Client client, v4l2_requestbuffers& r) {
     return ENOMEM;
   }
   owner_ = client;
-  owner_seen_ns_ = clock_ns(CLOCK_MONOTONIC);
   return 0;
 }
 
@@ -340,6 +334,11 @@ int V4l2Driver::dequeue_buffer(v4l2_buffer& b) {
   buffers_[b.index].queued = false;
   tell(b);
   return 0;
+}
+
+void V4l2Driver::client_came(Client client) {
+  const std::lock_guard lock(mutex_);
+  open_.push_back(client);
 }
 
 void V4l2Driver::client_gone(Client client) {

@@ -43,6 +43,7 @@ class V4l2Driver {
 
   // 0 or errno. `argument` is the request's own struct, with pointers in it resolved. DQBUF never waits: EAGAIN.
   [[nodiscard]] int handle(Client, std::uint32_t request, void* argument);
+  void client_came(Client);
   void client_gone(Client);
   // All who have it open now get ENODEV from now on.
   void unplug();
@@ -102,8 +103,7 @@ class V4l2Driver {
   std::uint32_t fourcc_;
   v4l2_rect crop_{};
   v4l2_fract interval_{};
-  Client owner_ = nullptr;  // who has the buffers
-  std::int64_t owner_seen_ns_ = 0;
+  Client owner_ = nullptr;    // who has the buffers
   std::vector<Client> gone_;  // had it open when it was unplugged
   std::vector<Client> open_;
   std::vector<Buffer> buffers_;

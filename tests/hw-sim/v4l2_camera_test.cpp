@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <vector>
 
 #include "common/file_bytes.h"
@@ -35,7 +38,7 @@ TEST_F(V4l2Ctl, SeesTheCameraAsItIs) {
   const test::CommandOutcome all = v4l2_ctl({"--all"});
   EXPECT_EQ(all.exit_code, 0) << all.err;
   for (const char* part : {"Mirrorfield camera", "Width/Height      : 64/48", "'RG12'", "Frames per second: 100.000",
-                           "auto_exposure", "wide_dynamic_range", "hdr_sensor_mode", "Crop: Left 0, Top 0, Width 64"})
+                           "auto_exposure", "wide_dynamic_range", "hdr_sensor_mode", "crop, Left 0, Top 0, Width 64"})
     EXPECT_TRUE(contains(all.out, part));
 }
 
@@ -86,11 +89,23 @@ TEST_F(V4l2Ctl, DoesNotFindAnUnpluggedCamera) {
   EXPECT_EQ(v4l2_ctl({"--all"}).exit_code, 0);
 }
 
-TEST(V4l2Camera, WithoutThePreloadLibraryItSaysWhatToDo) {
-  if (sim::has_umockdev()) GTEST_SKIP() << "umockdev is here";
-  const std::string error = test::input_error_of(
-      [] { sim::V4l2Camera(nullptr, test::pattern_camera(V4L2_PIX_FMT_GREY), test::fill_pattern); });
-  EXPECT_TRUE(contains(error, "umockdev-wrapper"));
+TEST_F(V4l2Ctl, KilledWhileItStreamsItLeavesTheCameraToOthers) {
+  const test::V4l2Rig rig(test::pattern_camera(V4L2_PIX_FMT_GREY));
+  for (int i = 0; i < 3; ++i) {
+    const pid_t child = ::fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+      ::execlp("v4l2-ctl", "v4l2-ctl", "-d", "/dev/video60", "--stream-mmap", "--stream-to=/dev/null", nullptr);
+      ::_exit(127);
+    }
+    const std::int64_t before = rig.camera.counts().frames;
+    for (int wait = 0; wait < 500 && rig.camera.counts().frames < before + 5; ++wait) ::usleep(10'000);
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    EXPECT_GE(rig.camera.counts().frames, before + 5);
+    for (int wait = 0; wait < 200 && rig.camera.counts().streaming; ++wait) ::usleep(10'000);
+    EXPECT_FALSE(rig.camera.counts().streaming);
+  }
 }
 
 TEST(V4l2Camera, OptionsThatMakeNoCameraAreRefused) {
