@@ -27,3 +27,11 @@ function(mf_add_test name)
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${PROJECT_BINARY_DIR})
   set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 LABELS "${ARG_LABELS}" TIMEOUT 900)
 endfunction()
+
+# mf_add_long_test(NAME OF PROGRAM FILTER): tests of a program once more, with their full counts
+# (tests/support/full_counts.h), labelled long: ctest -L long.
+function(mf_add_long_test name program filter)
+  add_test(NAME ${name} COMMAND ${program} --gtest_filter=${filter} WORKING_DIRECTORY ${PROJECT_BINARY_DIR})
+  set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77 LABELS long TIMEOUT 3600
+                                          ENVIRONMENT MIRRORFIELD_FULL_COUNTS=1)
+endfunction()

@@ -138,6 +138,8 @@ void SessionWriter::Impl::begin() {
   for (const auto& [key, document] : session_header_to_json(header)) write_document(key, document);
   index->run("COMMIT");
   sync_path(folder);
+  const fs::path whole = fs::absolute(folder);
+  sync_path((whole.has_filename() ? whole : whole.parent_path()).parent_path());  // the session's own name
 }
 
 void SessionWriter::Impl::write_document(const std::string& key, const nlohmann::json& document) {

@@ -12,10 +12,6 @@ namespace mf {
 // Throws InputError: no camera there, a setting that it refuses, a pixel format that we cannot unpack.
 [[nodiscard]] std::unique_ptr<CameraSource> open_aravis_source(const CameraSettings&);
 
-struct FoundCamera {
-  std::string name;  // for CameraSettings::address
-  std::string vendor, model, serial, address;
-};
 [[nodiscard]] std::vector<FoundCamera> find_aravis_cameras();
 
 }  // namespace mf

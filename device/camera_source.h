@@ -18,11 +18,13 @@ namespace mf {
 
 // What the operator asks of a camera. What is left open stays as the camera has it.
 struct CameraSettings {
-  std::string address;  // IP address, or the name that `mirrorfieldd --list` shows; empty: the first camera found
-  std::optional<std::string> pixel_format;      // as the camera names it: BayerRG12, Mono12p ...
+  // IP address, /dev/videoN, or the name that `mirrorfieldd --list` shows; empty: the first camera found
+  std::string address;
+  std::optional<std::string> pixel_format;      // as GenICam names it: BayerRG12, Mono12p ...
   std::optional<std::array<int, 4>> region_px;  // x, y, width, height
   std::optional<double> exposure_s;
   std::optional<double> gain_db;
+  std::optional<double> gain_step_db;  // V4L2: what one step of the gain control is, which V4L2 does not tell
   std::optional<double> frame_rate_hz;
   std::optional<ResponseRequest> response;
   std::optional<bool> ptp;                     // whether the camera's clock follows the network's master (IEEE 1588)
@@ -43,6 +45,12 @@ struct CameraDescription {
   SteadySettings steady;
   PtpReport ptp;
   std::string genicam_xml;  // empty when there is none
+};
+
+// A camera that answers, or a device that is there.
+struct FoundCamera {
+  std::string name;  // for CameraSettings::address
+  std::string vendor, model, serial, address;
 };
 
 struct CameraFrame {

@@ -77,6 +77,24 @@ void unpack_gige(std::span<const std::uint8_t> bytes, unsigned low_bits, std::sp
   }
 }
 
+// Groups of `per_group` codes: their high eight bits a byte each, then one byte with what is left of all of them.
+void unpack_mipi(std::span<const std::uint8_t> bytes, std::size_t per_group, std::span<std::uint16_t> codes) {
+  const auto low_bits = static_cast<unsigned>(8 / per_group);
+  const unsigned mask = (1U << low_bits) - 1;
+  for (std::size_t n = 0; n < codes.size(); ++n) {
+    const std::uint8_t* group = bytes.data() + n / per_group * (per_group + 1);
+    const std::size_t i = n % per_group;
+    const unsigned low = static_cast<unsigned>(group[per_group]) >> (low_bits * i) & mask;
+    codes[n] = code(static_cast<unsigned>(group[i]) << low_bits | low);
+  }
+}
+
+void unpack_words(std::span<const std::uint8_t> bytes, int bits, std::span<std::uint16_t> codes) {
+  const unsigned mask = (1U << bits) - 1;
+  for (std::size_t n = 0; n < codes.size(); ++n)
+    codes[n] = code((bytes[2 * n] | static_cast<unsigned>(bytes[2 * n + 1]) << 8) & mask);
+}
+
 }  // namespace
 
 std::size_t WireFormat::bytes_for(std::size_t pixels) const {
@@ -92,6 +110,12 @@ std::size_t WireFormat::bytes_for(std::size_t pixels) const {
     case Packing::gige_10:
     case Packing::gige_12:
       return (3 * pixels + 1) / 2;
+    case Packing::mipi_10:
+      return (pixels + 3) / 4 * 5;
+    case Packing::mipi_12:
+      return (pixels + 1) / 2 * 3;
+    case Packing::luma_of_yuyv:
+      return 2 * pixels;
   }
   return 0;
 }
@@ -116,12 +140,8 @@ void unpack(const WireFormat& format, std::span<const std::uint8_t> bytes, std::
     case Packing::bytes:
       std::copy_n(bytes.begin(), codes.size(), codes.begin());
       return;
-    case Packing::words: {
-      const unsigned mask = (1U << format.format.bits) - 1;
-      for (std::size_t n = 0; n < codes.size(); ++n)
-        codes[n] = code((bytes[2 * n] | static_cast<unsigned>(bytes[2 * n + 1]) << 8) & mask);
-      return;
-    }
+    case Packing::words:
+      return unpack_words(bytes, format.format.bits, codes);
     case Packing::lsb_10p:
       return unpack_stream(bytes, 10, codes);
     case Packing::lsb_12p:
@@ -130,6 +150,13 @@ void unpack(const WireFormat& format, std::span<const std::uint8_t> bytes, std::
       return unpack_gige(bytes, 2, codes);
     case Packing::gige_12:
       return unpack_gige(bytes, 4, codes);
+    case Packing::mipi_10:
+      return unpack_mipi(bytes, 4, codes);
+    case Packing::mipi_12:
+      return unpack_mipi(bytes, 2, codes);
+    case Packing::luma_of_yuyv:
+      for (std::size_t n = 0; n < codes.size(); ++n) codes[n] = bytes[2 * n];
+      return;
   }
 }
 

@@ -19,6 +19,9 @@ enum class Packing {
   lsb_12p,  // the same with 12 bits (PFNC "12p")
   gige_10,  // GigE Vision's "10Packed": three bytes hold two codes, the high eight bits in the outer ones
   gige_12,  // GigE Vision's "12Packed"
+  mipi_10,  // MIPI CSI-2 RAW10: five bytes hold four codes, the high eight bits first, their low two in the last byte
+  mipi_12,  // MIPI CSI-2 RAW12: three bytes hold two codes, the high eight bits first
+  luma_of_yuyv,  // every second byte; the colour differences are passed over
 };
 
 // A pixel format as it crosses the wire. Numbers and names are those of the GenICam Pixel Format Naming Convention
@@ -29,7 +32,7 @@ struct WireFormat {
   PixelFormat format;
   Packing packing = Packing::bytes;
 
-  // Bytes that so many pixels take, the last byte rounded up.
+  // Bytes that so many pixels take, the last byte (of MIPI's: the last group) rounded up.
   [[nodiscard]] std::size_t bytes_for(std::size_t pixels) const;
 };
 
