@@ -15,6 +15,13 @@ bool same_frames(const CameraDescription& a, const CameraDescription& b) {
   return a.format == b.format && a.width == b.width && a.height == b.height;
 }
 
+// What to ask of a camera for it to be set like this again; nothing where nobody knows.
+std::optional<ResponseRequest> request_of(const ResponseSetting& setting) {
+  if (const auto* slopes = std::get_if<MultiSlopeSensor>(&setting.in_force)) return *slopes;
+  if (const auto* pixel = std::get_if<LinLogSensor>(&setting.in_force)) return *pixel;
+  return std::nullopt;
+}
+
 }  // namespace
 
 CameraKeeper::CameraKeeper(OpenCamera open, std::chrono::milliseconds reopen_each)
@@ -39,11 +46,14 @@ Received CameraKeeper::receive(CameraFrame& into, std::chrono::milliseconds at_m
   return received;
 }
 
-void CameraKeeper::set_exposure_s(double exposure_s) {
-  exposure_s_ = exposure_s;
-  if (camera_ == nullptr) return;
-  camera_->set_exposure_s(exposure_s);
-  description_ = camera_->description();
+std::optional<MeteringResult> CameraKeeper::meter(const MeteringOptions& options, const FindTags& find_tags) {
+  if (camera_ == nullptr) return std::nullopt;
+  const MeteringResult result = mf::meter(*camera_, options, find_tags);
+  if (result.camera_lost) return std::nullopt;  // the next receive() tells
+  metered_ = result;
+  description_.exposure_s = result.exposure_s;
+  description_.response = result.response;
+  return result;
 }
 
 void CameraKeeper::reopen() {
@@ -51,7 +61,11 @@ void CameraKeeper::reopen() {
   try {
     std::unique_ptr<CameraSource> camera = open_();
     if (!same_frames(camera->description(), description_)) return;
-    if (exposure_s_) camera->set_exposure_s(*exposure_s_);
+    if (metered_) {
+      camera->set_exposure_s(metered_->exposure_s);
+      if (const auto request = request_of(metered_->response))
+        (void)apply_response(camera->features(), request, metered_->exposure_s);
+    }
     camera->start();
     camera_ = std::move(camera);
   } catch (const InputError&) {  // not back yet

@@ -7,13 +7,14 @@
 #include <optional>
 
 #include "device/camera_source.h"
+#include "device/metering.h"
 
 namespace mf {
 
 // Opens the camera; called again whenever it was lost. Throws InputError.
 using OpenCamera = std::function<std::unique_ptr<CameraSource>()>;
 
-// One camera, for as long as the daemon runs: opened again, with the exposure it had, whenever it is lost.
+// One camera, for as long as the daemon runs: opened again, set as it was metered, whenever it is lost.
 class CameraKeeper {
  public:
   // Opens and starts it. Throws InputError when it is not there or does not start.
@@ -26,8 +27,9 @@ class CameraKeeper {
 
   // As CameraSource::receive(); while the camera is away it tries to open it and tells `nothing`. `lost` is told once.
   [[nodiscard]] Received receive(CameraFrame& into, std::chrono::milliseconds at_most);
-  // Read back into description(). While the camera is away, it gets it when it is back. Throws InputError.
-  void set_exposure_s(double);
+  // Lets the metering set it, and keeps what it found: a camera that comes back is set so again. Nothing happens while
+  // the camera is away. Throws InputError.
+  std::optional<MeteringResult> meter(const MeteringOptions&, const FindTags&);
 
  private:
   void reopen();
@@ -36,7 +38,7 @@ class CameraKeeper {
   std::chrono::milliseconds reopen_each_;
   std::unique_ptr<CameraSource> camera_;
   CameraDescription description_;
-  std::optional<double> exposure_s_;  // that was set
+  std::optional<MeteringResult> metered_;
   std::chrono::steady_clock::time_point next_try_;
 };
 

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "device/camera_config.h"
 #include "device/config_table.h"
 
 namespace mf {
@@ -11,18 +12,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-CameraSettings camera_settings(ConfigTable table) {
-  CameraSettings s;
-  s.address = table.text("address").value_or("");
-  s.pixel_format = table.text("pixel_format");
-  s.region_px = table.region("region_px");
-  s.exposure_s = table.number("exposure_s", 1e-7, 60);
-  s.gain_db = table.number("gain_db", -20, 80);
-  s.frame_rate_hz = table.number("frame_rate_hz", 0.01, 10000);
-  s.packet_bytes = table.integer("packet_bytes", 576, 16000).value_or(s.packet_bytes);
-  s.socket_buffer_bytes = table.integer("socket_buffer_bytes", 65536, 1 << 30).value_or(s.socket_buffer_bytes);
+MeteringOptions metering_options(ConfigTable& table) {
+  MeteringOptions m;
+  m.least_exposure_s = table.number("least_exposure_s", 1e-7, 60).value_or(m.least_exposure_s);
+  m.most_exposure_s = table.number("most_exposure_s", 1e-7, 60).value_or(m.most_exposure_s);
+  m.clipped_share = table.number("clipped_share", 1e-9, 0.5).value_or(m.clipped_share);
+  m.headroom = table.number("headroom", 1, 100).value_or(m.headroom);
+  m.change_response = table.flag("change_response").value_or(m.change_response);
+  return m;
+}
+
+std::optional<MeteringOptions> read_metering_config(ConfigTable table, double black_level) {
+  const bool wanted = table.flag("on").value_or(true);
+  MeteringOptions m = metering_options(table);
+  m.black_level = black_level;
   table.refuse_unknown_keys();
-  return s;
+  if (const std::string fault = m.validate(); !fault.empty()) table.fail("most_exposure_s", fault);
+  return wanted ? std::optional(m) : std::nullopt;
 }
 
 }  // namespace
@@ -30,7 +36,8 @@ CameraSettings camera_settings(ConfigTable table) {
 DeviceConfig read_device_config(const fs::path& file) {
   const toml::table root = read_config_file(file);
   DeviceConfig config;
-  config.camera = camera_settings(ConfigTable(root, "camera", file.string()));
+  config.camera = read_camera_config(ConfigTable(root, "camera", file.string()));
+  config.camera.response = read_response_config(ConfigTable(root, "response", file.string()));
   ConfigTable mirror(root, "mirror", file.string());
   config.target = mirror.needed_path("target");
   config.world = mirror.path("world");
@@ -41,8 +48,25 @@ DeviceConfig read_device_config(const fs::path& file) {
   config.black_level_hint = recording.number("black_level_hint", 0, 65535).value_or(config.black_level_hint);
   config.recorder.queue_frames = recording.integer("queue_frames", 2, 10000).value_or(config.recorder.queue_frames);
   recording.refuse_unknown_keys();
+  config.metering = read_metering_config(ConfigTable(root, "metering", file.string()), config.black_level_hint);
+  config.operating = read_operator_config(root, file.string());
   config.status = read_status_config(ConfigTable(root, "status", file.string()));
   return config;
+}
+
+MachineCheckOptions machine_check_options(const DeviceConfig& config) {
+  const std::string& address = config.camera.address;
+  MachineCheckOptions o;
+  if (address.starts_with("/dev/"))
+    o.video_node = address;
+  else
+    o.gige = true;
+  o.usb = address.empty();
+  if (!address.empty() && address.find_first_not_of("0123456789.") == std::string::npos) o.camera_address = address;
+  o.packet_bytes = config.camera.packet_bytes;
+  o.socket_buffer_bytes = config.camera.socket_buffer_bytes;
+  o.recordings = config.recordings;
+  return o;
 }
 
 }  // namespace mf

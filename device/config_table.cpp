@@ -11,7 +11,8 @@ namespace {
 
 // In one place, so that no program takes another's table for a misspelt one.
 const std::set<std::string>& config_tables() {
-  static const std::set<std::string> names{"camera", "mirror", "recording", "status"};
+  static const std::set<std::string> names{"button",   "camera", "detection", "hid_button", "lamp",  "mirror",
+                                           "metering", "plane",  "recording", "response",   "status"};
   return names;
 }
 
@@ -74,6 +75,21 @@ std::optional<double> ConfigTable::number(const std::string& key, double low, do
   const std::optional<double> value = find<double>(key, "a number");
   if (value && !(*value >= low && *value <= high)) fail(key, fmt::format("must lie from {} to {}", low, high));
   return value;
+}
+
+std::optional<std::vector<double>> ConfigTable::numbers(const std::string& key, double low, double high) {
+  known_.insert(key);
+  if (table_ == nullptr || !table_->contains(key)) return std::nullopt;
+  const toml::array* list = (*table_)[key].as_array();
+  if (list == nullptr) fail(key, "must be a list of numbers");
+  std::vector<double> values;
+  for (const toml::node& node : *list) {
+    const std::optional<double> value = node.value<double>();
+    if (!value || !(*value >= low && *value <= high))
+      fail(key, fmt::format("must be a list of numbers from {} to {}", low, high));
+    values.push_back(*value);
+  }
+  return values;
 }
 
 std::optional<int> ConfigTable::integer(const std::string& key, int low, int high) {

@@ -37,6 +37,7 @@ class ConfigTable {
   [[nodiscard]] std::optional<std::string> text(const std::string& key);
   [[nodiscard]] std::optional<std::vector<std::string>> texts(const std::string& key);
   [[nodiscard]] std::optional<double> number(const std::string& key, double low, double high);
+  [[nodiscard]] std::optional<std::vector<double>> numbers(const std::string& key, double low, double high);
   [[nodiscard]] std::optional<int> integer(const std::string& key, int low, int high);
   [[nodiscard]] std::optional<std::array<int, 4>> region(const std::string& key);  // x, y, width, height, pixels
   [[nodiscard]] std::optional<std::filesystem::path> path(const std::string& key);

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <csignal>
-#include <ctime>
 
 #include "common/command_line/command_line.h"
 #include "common/error.h"
-#include "common/json_file.h"
 #include "device/aravis_source.h"
-#include "device/capture.h"
 #include "device/config.h"
+#include "device/daemon.h"
+#include "device/machine_check.h"
+#include "device/rig_status_json.h"
+#include "device/v4l2_source.h"
 
 namespace {
 
@@ -27,65 +27,79 @@ struct Arguments {
   std::filesystem::path config = "/etc/mirrorfield/mirrorfieldd.toml";
   std::filesystem::path output;
   double seconds = 0;
+  bool record = false;
   bool list = false;
+  bool check = false;
 };
 
 void list_cameras() {
-  const std::vector<mf::FoundCamera> found = mf::find_aravis_cameras();
+  std::vector<mf::FoundCamera> found = mf::find_aravis_cameras();
+  for (mf::FoundCamera& camera : mf::find_v4l2_cameras()) found.push_back(std::move(camera));
   for (const mf::FoundCamera& c : found)
     fmt::print("{:<32} {:<16} {} {} ({})\n", c.name, c.address, c.vendor, c.model, c.serial);
   if (found.empty()) fmt::print("no camera answers\n");
 }
 
-mf::SessionHeader header_of(const mf::DeviceConfig& config) {
-  mf::SessionHeader header;
-  header.black_level_hint = config.black_level_hint;
-  header.mirror_reflectance = config.mirror_reflectance;
-  header.target = mf::mirror_target_from_json(mf::read_json_file(config.target), config.target.string());
-  if (config.world)
-    header.world = mf::world_target_from_json(mf::read_json_file(*config.world), config.world->string());
-  return header;
+// What is wrong with this machine, if anything; an error among it is one of the program's.
+void check(const Arguments& a) {
+  std::vector<mf::Finding> findings{mf::check_config(a.config)};
+  if (findings[0].level == mf::Finding::Level::ok) {
+    const mf::DeviceConfig config = mf::read_device_config(a.config);
+    for (mf::Finding& f : mf::check_machine(mf::machine_check_options(config))) findings.push_back(std::move(f));
+    if (config.operating.button) findings.push_back(mf::check_button(*mf::open_start_button(*config.operating.button)));
+    if (config.operating.hid_button)
+      findings.push_back(mf::check_button(*mf::open_hid_button(*config.operating.hid_button)));
+  }
+  bool bad = false;
+  for (const mf::Finding& f : findings) {
+    fmt::print("{}\n", mf::finding_line(f));
+    bad = bad || f.level == mf::Finding::Level::error;
+  }
+  if (bad) throw mf::InputError("this machine", "", "cannot record: mend the errors above");
 }
 
-std::filesystem::path new_session(const mf::DeviceConfig& config) {
-  return config.recordings / fmt::format("{:%Y%m%d-%H%M%S}", fmt::gmtime(std::time(nullptr)));
+void show(const mf::RigStatus& s) {
+  fmt::print(stderr, "\r{}: {} frames durable, {} lost in {} gaps, queue {} {}  ", mf::rig_state_name(s.state),
+             s.durable_frames, s.lost_frames, s.gaps, s.queued, s.problem);
 }
 
-void show(const mf::RecorderStatus& s) {
-  fmt::print(stderr, "\r{} frames durable, {} lost in {} gaps, queue {}  ", s.durable, s.lost, s.gaps, s.queued);
-}
-
-void record(const Arguments& a) {
+void run(const Arguments& a) {
   const mf::DeviceConfig config = mf::read_device_config(a.config);
-  const std::filesystem::path session = a.output.empty() ? new_session(config) : a.output;
-  mf::CaptureOptions options;
-  options.recorder = config.recorder;
+  mf::DaemonOptions options;
+  options.record_now = a.record || !a.output.empty();
+  if (!a.output.empty()) options.session = a.output;
   options.most_seconds = a.seconds;
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   const bool person = isatty(STDERR_FILENO) != 0;
-  const mf::CaptureResult r =
-      mf::capture([&] { return mf::open_aravis_source(config.camera); }, session, header_of(config), options, stop,
-                  person ? show : std::function<void(const mf::RecorderStatus&)>());
-  fmt::print("{}{}: {} frames of {} x {} {} in {:.1f} s, {} lost in {} gaps\n", person ? "\n" : "", session.string(),
-             r.recorder.durable, r.camera.width, r.camera.height, mf::pixel_format_name(r.camera.format), r.seconds,
-             r.recorder.lost, r.recorder.gaps);
-  if (r.recorder.failure)
-    throw mf::InputError(session.string(), "", "the recording stopped early: " + *r.recorder.failure);
+  const mf::RigStatus last =
+      run_daemon(config, options, stop, person ? show : std::function<void(const mf::RigStatus&)>());
+  if (!options.record_now) return;
+  if (last.session.empty()) throw mf::InputError("mirrorfieldd", "", last.problem);
+  fmt::print("{}{}: {} frames in {:.1f} s, {} lost in {} gaps\n", person ? "\n" : "", last.session, last.durable_frames,
+             last.seconds, last.lost_frames, last.gaps);
+  if (last.state == mf::RigState::error)
+    throw mf::InputError(last.session, "", "the recording stopped early: " + last.problem);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  mf::CommandLine program("mirrorfieldd",
-                          "Records a mirror capture from a GigE Vision or USB3 Vision camera until it is told to stop "
-                          "(SIGINT, SIGTERM).",
-                          MIRRORFIELD_VERSION);
+  mf::CommandLine program(
+      "mirrorfieldd",
+      "The daemon of the rig: records mirror captures from a GigE Vision, USB3 Vision or V4L2 camera when its "
+      "button is pressed.",
+      MIRRORFIELD_VERSION);
   Arguments arguments;
   program.option("--config", arguments.config, "what the rig is (docs/rig.md)");
-  program.option("-o,--output", arguments.output, "the session to make (default: a new one in the config's folder)");
-  program.option("--seconds", arguments.seconds, "stop by itself after so long; 0: don't");
+  program.option("-o,--output", arguments.output, "record at once, into this session, and end with it");
+  program.flag("--record", arguments.record, "record at once, into a new session in the config's folder");
+  program.option("--seconds", arguments.seconds, "stop a recording by itself after so long; 0: don't");
+  program.flag("--check", arguments.check, "say what is wrong with this machine, and change nothing");
   program.flag("--list", arguments.list, "show the cameras that answer, and record nothing");
-  program.on_run([&] { arguments.list ? list_cameras() : record(arguments); });
+  program.on_run([&] {
+    if (arguments.list) return list_cameras();
+    arguments.check ? check(arguments) : run(arguments);
+  });
   return program.run(argc, argv);
 }

@@ -18,6 +18,15 @@ nlohmann::json document_of(const CameraDescription& d) {
           {"exposure_s", d.exposure_s},
           {"gain_db", d.gain_db},
           {"frame_rate_hz", d.frame_rate_hz},
+          {"response", to_json(d.response)},
+          {"steady", {{"readings", to_json(d.steady.readings)}, {"remarks", d.steady.remarks}}},
+          {"ptp",
+           {{"available", d.ptp.available},
+            {"enabled", d.ptp.enabled},
+            {"status", d.ptp.status},
+            {"offset_ns", d.ptp.offset_ns ? nlohmann::json(*d.ptp.offset_ns) : nlohmann::json()},
+            {"readings", to_json(d.ptp.readings)},
+            {"remarks", d.ptp.remarks}}},
           {"genicam_xml", d.genicam_xml}};
 }
 

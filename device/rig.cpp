@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/json_file.h"
+#include "device/board.h"
 
 namespace mf {
 
@@ -27,12 +29,6 @@ std::filesystem::path new_session(const std::filesystem::path& folder) {
   return name;
 }
 
-std::int64_t free_bytes(const std::filesystem::path& folder) {
-  std::error_code unknown;
-  const auto space = std::filesystem::space(folder, unknown);
-  return unknown ? 0 : static_cast<std::int64_t>(space.available);
-}
-
 }  // namespace
 
 Rig::Rig(OpenCamera open, const RigOptions& options, RigLinks links)
@@ -45,6 +41,33 @@ Rig::Rig(OpenCamera open, const RigOptions& options, RigLinks links)
   spare_.codes = ImageU16(camera.width, camera.height, 1);
   status_.camera = fmt::format("{} {} {}", camera.vendor, camera.model, camera.serial);
   status_.queue_frames = options.recorder.queue_frames;
+  meter();
+}
+
+void Rig::meter() {
+  if (!options_.metering) return;
+  const RigState before = std::exchange(status_.state, RigState::metering);
+  tell_now();
+  const std::optional<MeteringResult> result = keeper_.meter(*options_.metering, {});
+  status_.state = before;
+  if (result) camera_remark_ = result->remarks.empty() ? "" : result->remarks.front();
+  looked_ = RigClock::now();
+  told_ = {};
+}
+
+// Between recordings: meters anew when what comes would no longer be exposed well.
+void Rig::watch_light() {
+  constexpr double look_each_s = 1;
+  if (!options_.metering || seconds_since(looked_) < look_each_s) return;
+  looked_ = RigClock::now();
+  const CameraDescription& camera = keeper_.description();
+  MeteringState state;
+  state.exposure_s = camera.exposure_s;
+  state.curve = approximate_response_curve(camera.response, camera.format, options_.metering->black_level);
+  const MeteringStep step = next_setting(frame_levels(spare_.codes, camera.format, {}), state, *options_.metering);
+  const double change = step.exposure_s / camera.exposure_s;
+  constexpr double worth_it = 1.5;  // below, the headroom is there for it
+  if (!step.good && (change > worth_it || change < 1 / worth_it)) meter();
 }
 
 void Rig::step() {
@@ -56,6 +79,8 @@ void Rig::step() {
   if (recording_) {
     recording_->take(received);
     watch_recording();
+  } else if (received == Received::frame) {
+    watch_light();
   }
   tell_regularly();
 }
@@ -71,7 +96,7 @@ void Rig::start() {
   status_.lost_frames = status_.gaps = status_.durable_frames = 0;
   began_ = RigClock::now();
   try {
-    const std::int64_t free = free_bytes(options_.recordings);
+    const std::int64_t free = free_bytes(options_.recordings).value_or(0);
     if (free < options_.least_free_bytes)
       throw InputError(options_.recordings.string(), "",
                        fmt::format("has {} MB left: free some space before recording", free >> 20));
@@ -84,6 +109,9 @@ void Rig::start() {
 void Rig::begin(const std::filesystem::path& session) {
   recording_.emplace(session, options_.header, keeper_.description(), options_.recorder);
   status_.session = session.string();
+  const CameraDescription& camera = keeper_.description();
+  if (const auto curve = response_curve_of(camera.response, camera.format, options_.header.black_level_hint))
+    write_json_file(session / "response.json", to_json(*curve));
 }
 
 void Rig::stop() {
@@ -148,9 +176,14 @@ void Rig::tell_regularly() {
   if (const double since = seconds_since(rated_); since >= 1) {
     status_.frame_rate_hz = static_cast<double>(std::exchange(frames_, 0)) / since;
     rated_ = RigClock::now();
-    status_.free_bytes = free_bytes(options_.recordings);
+    status_.free_bytes = free_bytes(options_.recordings).value_or(0);
+    status_.temperature_c = board_temperature_c();
   }
   status_.exposure_s = keeper_.description().exposure_s;
+  tell_now();
+}
+
+void Rig::tell_now() {
   if (links_.tell) links_.tell(status_);
 }
 

@@ -22,6 +22,7 @@ struct RigOptions {
   std::chrono::milliseconds tell_each{200};    // how often the status is told while nothing happens
   double most_seconds = 0;                     // of a recording; 0: until stopped
   std::int64_t least_free_bytes = 64 << 20;    // with less, a recording is not begun
+  std::optional<MeteringOptions> metering;     // nothing: the camera stays as it was opened
 };
 
 enum class RigCommand { start, stop };
@@ -34,8 +35,12 @@ struct RigLinks {
 
 // The daemon's loop: a camera that always runs, and recordings that the operator starts and stops.
 //
-//   idle ──start──▶ recording ──stop──▶ done ──start──▶ recording ...
-//                       └── the disk or the camera's settings fail ──▶ error ──start──▶ recording ...
+//   metering ──▶ idle ──start──▶ recording ──stop──▶ done ──start──▶ recording ...
+//                                    └── the disk or the camera's settings fail ──▶ error ──start──▶ recording ...
+//
+// It meters when the camera is there, and again between recordings when the light has changed; from the start of a
+// recording to its end everything stays as it is. A recording of a camera whose response is known brings its
+// response.json along.
 //
 // `recording` is told from the first durable frame on. A disk that refuses the session's index, or frame after frame,
 // ends that session; unless the disk is full, the recording goes on in another one ("NAME-2"), with an alarm.
@@ -48,6 +53,7 @@ class Rig {
   void step();
   void obey(RigCommand);
 
+  [[nodiscard]] bool is_recording() const { return recording_.has_value(); }
   [[nodiscard]] const RigStatus& status() const { return status_; }
   [[nodiscard]] const CameraDescription& camera() const { return keeper_.description(); }
 
@@ -60,6 +66,9 @@ class Rig {
   void go_on_elsewhere(const RecorderStatus&);
   void note(const RecorderStatus&);
   void tell_regularly();
+  void tell_now();
+  void meter();
+  void watch_light();
 
   CameraKeeper keeper_;
   RigOptions options_;
@@ -73,6 +82,8 @@ class Rig {
   std::string alarm_;        // stays until the next start
   std::int64_t frames_ = 0;  // since the rate was taken last
   std::chrono::steady_clock::time_point rated_;
+  std::chrono::steady_clock::time_point looked_;  // at the light
+  std::string camera_remark_;                     // of the metering; stays until the next
 };
 
 }  // namespace mf

@@ -25,7 +25,7 @@ struct StatusSocketOptions {
 
 // Somebody asks for a recording.
 struct StartRequest {
-  std::string token;  // as it was given: whoever acts on the request judges it
+  std::string token;  // as it was given; who may ask at all is judged here, the word from the network by the page
   uid_t user = 0;     // of the process that asked
   pid_t process = 0;
 };
