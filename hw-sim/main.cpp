@@ -15,6 +15,7 @@
 #include "hw-sim/capture.h"
 #include "hw-sim/scenario_run.h"
 #include "hw-sim/session_camera.h"
+#include "hw-sim/v4l2_camera.h"
 
 namespace {
 
@@ -96,10 +97,13 @@ struct PlayArguments {
 
 // The button is an input device below umockdev: this program and the daemon look for it through its library.
 void run_with_umockdev(char** argv) {
-  if (mf::sim::runs_with_umockdev()) return;
+  if (mf::sim::has_umockdev()) return;
+  const char* given = std::getenv("LD_PRELOAD");
+  if (given != nullptr && std::string_view(given).find(mf::sim::umockdev_library) != std::string_view::npos)
+    throw mf::InputError(mf::sim::umockdev_library, "", "cannot be preloaded: install the package umockdev");
   ::setenv("LD_PRELOAD", mf::sim::umockdev_library, 1);
   ::execv("/proc/self/exe", argv);
-  throw mf::InputError(mf::sim::umockdev_library, "", "cannot be preloaded: install the package umockdev");
+  throw mf::InputError("mirrorfield-sim", "", "cannot start itself again");
 }
 
 void play_scenario(const PlayArguments& a) {

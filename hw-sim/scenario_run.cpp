@@ -264,10 +264,6 @@ void write_played(const fs::path& truth, const std::vector<PlayedFrame>& played)
 
 }  // namespace
 
-bool runs_with_umockdev() {
-  return umockdev_in_mock_environment() != 0;
-}
-
 ScenarioResult run_scenario(const Scenario& scenario, const ScenarioFiles& files, const Progress& progress,
                             const std::function<void(const std::string&)>& say) {
   std::error_code error;

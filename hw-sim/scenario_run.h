@@ -15,7 +15,6 @@ namespace mf::sim {
 
 // What the simulated button and V4L2 camera are seen through: to be preloaded by who makes and by who uses them.
 inline constexpr const char* umockdev_library = "libumockdev-preload.so.0";
-[[nodiscard]] bool runs_with_umockdev();
 
 struct ScenarioResult {
   RigStatus last;                 // what the daemon told last
@@ -34,7 +33,7 @@ struct ScenarioFiles {
 // and ends the daemon. Beside the session it writes truth/ (docs/simulator.md): what `mirrorfield-sim capture` writes
 // there, and played.json, which frame of the take each of the camera's frames showed. `say` hears of each event.
 //
-// Must run with umockdev's preload library (runs_with_umockdev()): the button is an input device that is not there.
+// Must run with umockdev's preload library (has_umockdev()): the button is an input device that is not there.
 // Throws InputError: the folder exists, the camera's address is taken, the daemon does not start or tells nothing.
 [[nodiscard]] ScenarioResult run_scenario(const Scenario&, const ScenarioFiles&, const Progress&,
                                           const std::function<void(const std::string&)>& say);

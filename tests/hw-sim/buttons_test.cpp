@@ -14,6 +14,7 @@
 #include "device/start_button.h"
 #include "device/usb_reset.h"
 #include "hw-sim/hid_button.h"
+#include "hw-sim/v4l2_camera.h"
 #include "tests/support/expect_input_error.h"
 
 namespace mf {
@@ -70,7 +71,7 @@ class ButtonsTest : public testing::Test {
  protected:
   void SetUp() override {
     testbed_.reset(umockdev_testbed_new());
-    if (umockdev_in_mock_environment() == 0) GTEST_SKIP() << "runs under umockdev-wrapper (package umockdev)";
+    if (!sim::has_umockdev()) GTEST_SKIP() << "runs under umockdev-wrapper (package umockdev)";
   }
   std::unique_ptr<UMockdevTestbed, FreeWith<g_object_unref>> testbed_;
 };
