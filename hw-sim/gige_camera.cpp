@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
@@ -23,6 +22,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "hw-sim/gige_block.h"
 #include "hw-sim/gige_registers.h"
 
 namespace mf::sim {
@@ -30,7 +30,6 @@ namespace mf::sim {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::uint16_t gvcp_port = 3956;
 constexpr std::uint8_t gvcp_key = 0x42;
@@ -48,21 +47,6 @@ enum Command : std::uint16_t {  // GVCP, §16
   write_memory = 0x0086,
 };
 enum Status : std::uint16_t { ok = 0, not_implemented = 0x8001, invalid_address = 0x8003, access_denied = 0x8006 };
-
-void put16(Bytes& out, std::uint32_t value) {
-  out.push_back(static_cast<std::uint8_t>(value >> 8));
-  out.push_back(static_cast<std::uint8_t>(value));
-}
-void put32(Bytes& out, std::uint32_t value) {
-  put16(out, value >> 16);
-  put16(out, value & 0xFFFF);
-}
-std::uint16_t get16(std::span<const std::uint8_t> in, std::size_t at) {
-  return static_cast<std::uint16_t>(in[at] << 8 | in[at + 1]);
-}
-std::uint32_t get32(std::span<const std::uint8_t> in, std::size_t at) {
-  return std::uint32_t{get16(in, at)} << 16 | get16(in, at + 2);
-}
 
 bool same_peer(const sockaddr_in& a, const sockaddr_in& b) {
   return a.sin_addr.s_addr == b.sin_addr.s_addr && a.sin_port == b.sin_port;
@@ -104,20 +88,6 @@ class Socket {
   int descriptor_;
 };
 
-// One frame on its way: what a resend needs.
-struct Block {
-  std::uint16_t number = 0;
-  std::uint64_t timestamp_ns = 0;
-  std::size_t data_per_packet = 0;
-  std::uint32_t pfnc = 0;
-  bool chunks = false;
-  Bytes payload;
-
-  [[nodiscard]] std::uint32_t data_packets() const {
-    return static_cast<std::uint32_t>((payload.size() + data_per_packet - 1) / data_per_packet);
-  }
-};
-
 }  // namespace
 
 struct GigeCamera::Impl {
@@ -143,10 +113,8 @@ struct GigeCamera::Impl {
   void boot();
 
   void send_frames();
-  void send_packets(const Block&, std::unique_lock<std::mutex>& lock);
-  [[nodiscard]] Block next_frame_to_take(GigeShot&);
-  static void append_chunks(Block&, std::size_t picture_bytes, const GigeShot&);
-  [[nodiscard]] Bytes packet_of(const Block&, std::uint32_t packet) const;
+  void send_packets(const GigeBlock&, std::unique_lock<std::mutex>& lock);
+  [[nodiscard]] GigeBlock next_frame_to_take(GigeShot&);
   [[nodiscard]] std::uint64_t clock_ns() const;
   [[nodiscard]] bool streaming() const {
     return alive && registers.read(gige::acquisition) == 1U && registers.read(gige::stream_port).value_or(0) != 0;
@@ -166,7 +134,7 @@ struct GigeCamera::Impl {
   sockaddr_in controller{};
   Clock::time_point last_heard;
   sockaddr_in destination{};
-  std::deque<std::shared_ptr<const Block>> recent;  // a packet is made without the lock
+  std::deque<std::shared_ptr<const GigeBlock>> recent;  // a packet is made without the lock
   std::uint64_t next_frame = 1;
   std::uint16_t next_block = 1;
   GigeCameraCounts counts;
@@ -345,37 +313,8 @@ void GigeCamera::Impl::resend(std::span<const std::uint8_t> data) {
   }
 }
 
-// GVSP §23: packet 0 is the leader, then the data, then the trailer.
-Bytes GigeCamera::Impl::packet_of(const Block& block, std::uint32_t packet) const {
-  const std::uint32_t last_data = block.data_packets();
-  const std::uint32_t kind = packet == 0 ? 1 : packet <= last_data ? 3 : 2;
-  Bytes out;
-  out.reserve(block.data_per_packet + 64);
-  put16(out, 0);
-  put16(out, block.number);
-  put32(out, kind << 24 | packet);
-  if (kind == 1) {
-    put32(out, block.chunks ? 0x4001 : 0x0001);  // an image, with chunks behind it
-    put32(out, static_cast<std::uint32_t>(block.timestamp_ns >> 32));
-    put32(out, static_cast<std::uint32_t>(block.timestamp_ns));
-    put32(out, block.pfnc);
-    put32(out, static_cast<std::uint32_t>(options.width));
-    put32(out, static_cast<std::uint32_t>(options.height));
-    for (int i = 0; i < 3; ++i) put32(out, 0);  // offsets, paddings
-  } else if (kind == 3) {
-    const std::size_t begin = (packet - 1) * block.data_per_packet;
-    const std::size_t end = std::min(begin + block.data_per_packet, block.payload.size());
-    out.insert(out.end(), block.payload.begin() + static_cast<std::ptrdiff_t>(begin),
-               block.payload.begin() + static_cast<std::ptrdiff_t>(end));
-  } else {
-    put32(out, block.chunks ? 0x4001 : 0x0001);
-    put32(out, static_cast<std::uint32_t>(options.height));
-  }
-  return out;
-}
-
-Block GigeCamera::Impl::next_frame_to_take(GigeShot& shot) {
-  Block block;
+GigeBlock GigeCamera::Impl::next_frame_to_take(GigeShot& shot) {
+  GigeBlock block;
   block.number = next_block;
   next_block = next_block == 65535 ? std::uint16_t{1} : static_cast<std::uint16_t>(next_block + 1);
   block.timestamp_ns = clock_ns();
@@ -385,30 +324,13 @@ Block GigeCamera::Impl::next_frame_to_take(GigeShot& shot) {
   shot = {next_frame++, 1e-6 * registers.real(gige::exposure_us), registers.real(gige::gain_db), registers.response(),
           registers.format()};
   block.pfnc = shot.format.pfnc;
+  block.width = options.width;
+  block.height = options.height;
   return block;
 }
 
-// GVSP §24: each chunk is its data, its identity, its length; the picture is the first.
-void GigeCamera::Impl::append_chunks(Block& block, std::size_t picture_bytes, const GigeShot& shot) {
-  Bytes chunks;
-  const auto end_chunk = [&](std::uint32_t identity, std::size_t size) {
-    put32(chunks, identity);
-    put32(chunks, static_cast<std::uint32_t>(size));
-  };
-  const auto put64 = [&](std::uint64_t value) {
-    put32(chunks, static_cast<std::uint32_t>(value >> 32));
-    put32(chunks, static_cast<std::uint32_t>(value));
-  };
-  end_chunk(gige_chunk::image, picture_bytes);
-  put64(block.timestamp_ns);
-  end_chunk(gige_chunk::timestamp, 8);
-  put64(std::bit_cast<std::uint64_t>(1e6 * shot.exposure_s));
-  end_chunk(gige_chunk::exposure_us, 8);
-  std::copy(chunks.begin(), chunks.end(), block.payload.begin() + static_cast<std::ptrdiff_t>(picture_bytes));
-}
-
 // `lock` is held on entry and on return.
-void GigeCamera::Impl::send_packets(const Block& block, std::unique_lock<std::mutex>& lock) {
+void GigeCamera::Impl::send_packets(const GigeBlock& block, std::unique_lock<std::mutex>& lock) {
   std::uniform_real_distribution<double> chance;
   const Clock::time_point begun = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                                      std::chrono::duration<double>(jitter_s * chance(losses)));
@@ -447,7 +369,7 @@ void GigeCamera::Impl::send_frames() {
       continue;
     }
     GigeShot shot;
-    const auto sent = std::make_shared<Block>(next_frame_to_take(shot));
+    const auto sent = std::make_shared<GigeBlock>(next_frame_to_take(shot));
     const std::size_t picture_bytes = registers.picture_bytes();
     if (skipping > 0) {
       --skipping;
@@ -455,7 +377,7 @@ void GigeCamera::Impl::send_frames() {
     }
     lock.unlock();
     expose(shot, std::span(sent->payload).first(picture_bytes));
-    if (sent->chunks) append_chunks(*sent, picture_bytes, shot);
+    if (sent->chunks) append_chunks(*sent, picture_bytes, shot.exposure_s);
     lock.lock();
     recent.push_back(sent);
     if (recent.size() > kept_blocks) recent.pop_front();
