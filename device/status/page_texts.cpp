@@ -22,7 +22,9 @@ std::string text_of(const nlohmann::json& json_value) {
 std::shared_ptr<const PageTexts> PageTextMaker::make(const RigNews& news, std::chrono::steady_clock::time_point now) {
   nlohmann::json all{{"connected", news.connected}, {"problem", news.problem}, {"remote_start", remote_start_}};
   if (news.start_answer)
-    all["start_answer"] = {{"accepted", news.start_answer->accepted}, {"reason", news.start_answer->reason}};
+    all["start_answer"] = {{"number", news.start_answer->number},
+                           {"accepted", news.start_answer->accepted},
+                           {"reason", news.start_answer->reason}};
   if (news.status) {
     nlohmann::json status = rig_status_to_json(*news.status);
     if (news.status->preview && previewed_ != news.status) {

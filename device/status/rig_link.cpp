@@ -135,7 +135,8 @@ void RigLink::take_line(const std::string& line) {
     const nlohmann::json said = nlohmann::json::parse(line, nullptr, false);
     if (said.is_discarded()) throw InputError(source, "", "is no JSON: are both of one version?");
     if (said.is_object() && said.contains("answer")) {
-      news_.start_answer = StartAnswer{said.value("accepted", false), said.value("reason", "")};
+      const int number = news_.start_answer ? news_.start_answer->number + 1 : 1;
+      news_.start_answer = StartAnswer{number, said.value("accepted", false), said.value("reason", "")};
     } else {
       news_.status = std::make_shared<const RigStatus>(rig_status_from_json(said, source));
       news_.status_at = std::chrono::steady_clock::now();

@@ -17,6 +17,7 @@
 namespace mf {
 
 struct StartAnswer {
+  int number = 0;  // of the request, from 1
   bool accepted = false;
   std::string reason;  // why not
 };

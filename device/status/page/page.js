@@ -213,21 +213,29 @@ function picture() {
   say("tags", preview.tags.length === 0 ? "no tags seen" : preview.posed ? seen + ", mirror found" : seen);
 }
 
+let asked = null;  // how many answers there were when this browser asked for a start
+function answers() { return latest && latest.start_answer ? latest.start_answer.number : 0; }
+
 function startPanel() {
   const s = latest.status;
   const possible = latest.connected && latest.remote_start && s && s.state !== "recording" && s.state !== "metering";
   byId("start").hidden = !possible;
   byId("token-row").hidden = Boolean(localStorage.getItem("mirrorfield-token"));
-  if (latest.start_answer && latest.start_answer.accepted === false) say("start-answer", "Refused: " + latest.start_answer.reason);
+  // Only what this browser asked for, and not an older answer.
+  if (asked === null || answers() <= asked) return;
+  if (!latest.start_answer.accepted) say("start-answer", "Refused: " + latest.start_answer.reason);
+  asked = null;
 }
 
 async function start(event) {
   event.preventDefault();
   const token = localStorage.getItem("mirrorfield-token") || byId("token").value.trim();
+  const before = answers();
   say("start-answer", "Asking…");
   try {
     const answer = await fetch("/start", { method: "POST", headers: { "Content-Type": "application/json" },
                                            body: JSON.stringify({ token }) });
+    if (answer.ok) asked = before;
     if (answer.ok) localStorage.setItem("mirrorfield-token", token);
     if (answer.status === 403) localStorage.removeItem("mirrorfield-token");
     byId("token-row").hidden = answer.status !== 403;

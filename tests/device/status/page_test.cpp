@@ -266,6 +266,11 @@ TEST_F(StatusPageTest, APairedBrowserStartsARecording) {
   }
   ASSERT_TRUE(start);
   EXPECT_EQ(start->token, token);
+  // The rig has taken it; a second one while that waits would be refused, and the page says so.
+  browser.value("document.getElementById('start-button').click()");
+  browser.value("document.getElementById('start-button').click()");
+  EXPECT_TRUE(
+      browser.becomes("document.getElementById('start-answer').textContent === 'Refused: another request waits'"));
   // Another day, by the link that pairs: the word is not asked for, and does not stay in the address.
   browser.open(program.url() + "#token=" + token);
   ASSERT_TRUE(browser.becomes("!document.getElementById('start').hidden"));
