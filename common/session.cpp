@@ -16,6 +16,7 @@
 #include "common/durable_file.h"
 #include "common/error.h"
 #include "common/file_bytes.h"
+#include "common/session_checks.h"
 #include "common/session_header.h"
 #include "common/sqlite.h"
 #include "common/tiff_image.h"
@@ -54,6 +55,14 @@ CREATE TABLE arrivals (
   device_ns    INTEGER NOT NULL,
   monotonic_ns INTEGER NOT NULL,
   realtime_ns  INTEGER NOT NULL
+);
+CREATE TABLE checks (
+  frame INTEGER PRIMARY KEY REFERENCES frames (id),
+  crc32 INTEGER NOT NULL
+);
+CREATE TABLE document_checks (
+  key   TEXT PRIMARY KEY REFERENCES meta (key),
+  crc32 INTEGER NOT NULL
 );
 CREATE TABLE gaps (
   next_id      INTEGER NOT NULL,
@@ -143,8 +152,11 @@ void SessionWriter::Impl::begin() {
 }
 
 void SessionWriter::Impl::write_document(const std::string& key, const nlohmann::json& document) {
+  const std::string text = document.dump();
   SqliteStatement write(*index, "INSERT OR REPLACE INTO meta (key, json) VALUES (?, ?)");
-  write.bind(1, key).bind(2, document.dump()).step();
+  write.bind(1, key).bind(2, text).step();
+  SqliteStatement check_row(*index, "INSERT OR REPLACE INTO document_checks (key, crc32) VALUES (?, ?)");
+  check_row.bind(1, key).bind(2, std::int64_t{crc32(text)}).step();
 }
 
 void SessionWriter::Impl::insert(const std::vector<Pending>& frames) {
@@ -152,11 +164,14 @@ void SessionWriter::Impl::insert(const std::vector<Pending>& frames) {
                             "INSERT INTO frames (id, role, name, exposure_s, nd_density, time_s, file, bytes, crc32) "
                             "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)");
   SqliteStatement arrival_row(*index, "INSERT INTO arrivals VALUES (?, ?, ?, ?, ?)");
+  SqliteStatement check_row(*index, "INSERT INTO checks VALUES (?, ?)");
   for (const auto& [frame, durable, tiff] : frames) {
     frame_row.bind(1, frame.id).bind(2, std::string(frame_role_name(frame.info.role))).bind(3, frame.info.name);
     frame_row.bind(4, frame.info.exposure_s).bind(5, frame.info.nd_density).bind(6, frame.info.time_s);
     frame_row.bind(7, frame.file).bind(8, frame.bytes).bind(9, std::int64_t{frame.crc32}).step();
     frame_row.reset();
+    check_row.bind(1, frame.id).bind(2, std::int64_t{row_check(frame)}).step();
+    check_row.reset();
     if (!frame.arrival) continue;
     const FrameArrival& arrival = *frame.arrival;
     arrival_row.bind(1, frame.id).bind(2, arrival.device_frame).bind(3, arrival.device_ns);
@@ -324,7 +339,14 @@ std::int64_t SessionWriter::commit() {
 void SessionWriter::write_document(const std::string& key, const nlohmann::json& document) {
   const std::lock_guard lock(impl_->index_mutex);
   check(impl_->index.has_value(), "nothing is written to a finished session");
-  impl_->write_document(key, document);
+  impl_->index->run("BEGIN");
+  try {
+    impl_->write_document(key, document);
+    impl_->index->run("COMMIT");
+  } catch (...) {
+    impl_->index->run_quietly("ROLLBACK");
+    throw;
+  }
 }
 
 void SessionWriter::finish() {
@@ -349,6 +371,8 @@ struct SessionReader::Impl {
   void read_frames(const SqliteDatabase&);
   void read_arrivals(const SqliteDatabase&);
   void read_gaps(const SqliteDatabase&);
+  void check_documents(const SqliteDatabase&) const;
+  void check_rows(const SqliteDatabase&);
 };
 
 // Sessions from before recorders have no arrivals and no gaps.
@@ -372,6 +396,7 @@ void SessionReader::Impl::read_header(const SqliteDatabase& index) {
   SqliteStatement verdict(index, "PRAGMA quick_check(1)");
   if (!verdict.step() || verdict.text(0) != "ok")
     throw InputError(index.file(), "", fmt::format("is damaged ({}): restore it from a copy", verdict.text(0)));
+  check_documents(index);
   SqliteStatement rows(index, "SELECT key, json FROM meta");
   while (rows.step()) {
     try {
@@ -415,6 +440,26 @@ void SessionReader::Impl::read_gaps(const SqliteDatabase& index) {
   while (rows.step()) gaps.push_back({rows.integer(0), rows.integer(1), rows.integer(2), rows.text(3)});
 }
 
+// Sessions from before there were checks are not checked.
+void SessionReader::Impl::check_documents(const SqliteDatabase& index) const {
+  if (!has_table(index, "document_checks")) return;
+  SqliteStatement rows(index, "SELECT meta.key, json, crc32 FROM meta LEFT JOIN document_checks USING (key)");
+  while (rows.step())
+    if (std::int64_t{crc32(rows.text(1))} != rows.integer(2))
+      throw InputError(index.file(), rows.text(0), "is damaged (its checksum differs): restore it from a copy");
+}
+
+void SessionReader::Impl::check_rows(const SqliteDatabase& index) {
+  if (!has_table(index, "checks")) return;
+  std::map<std::int64_t, std::int64_t> checks;
+  SqliteStatement rows(index, "SELECT frame, crc32 FROM checks");
+  while (rows.step()) checks[rows.integer(0)] = rows.integer(1);
+  for (SessionFrame& frame : frames) {
+    const auto found = checks.find(frame.id);
+    frame.damaged = found == checks.end() || found->second != std::int64_t{row_check(frame)};
+  }
+}
+
 SessionReader::SessionReader(fs::path folder) : impl_(std::make_unique<Impl>()) {
   impl_->folder = std::move(folder);
   const fs::path index_path = index_file(impl_->folder);
@@ -431,6 +476,7 @@ SessionReader::SessionReader(fs::path folder) : impl_(std::make_unique<Impl>()) 
   impl_->read_frames(index);
   impl_->read_arrivals(index);
   impl_->read_gaps(index);
+  impl_->check_rows(index);
 }
 
 SessionReader::SessionReader(SessionReader&&) noexcept = default;
@@ -448,6 +494,10 @@ const std::vector<SessionFrame>& SessionReader::frames() const {
 
 const std::vector<FrameGap>& SessionReader::gaps() const {
   return impl_->gaps;
+}
+
+std::int64_t SessionReader::frames_without_row() const {
+  return std::max<std::int64_t>(count_frame_files(impl_->folder) - static_cast<std::int64_t>(impl_->frames.size()), 0);
 }
 
 std::optional<nlohmann::json> SessionReader::document(const std::string& key) const {
@@ -489,6 +539,9 @@ std::vector<SessionFrame> SessionReader::frames(FrameRole role) const {
 
 Frame SessionReader::read_frame(const SessionFrame& frame) const {
   const fs::path path = impl_->folder / frame.file;
+  if (frame.damaged)
+    throw InputError(index_file(impl_->folder).string(), fmt::format("frames[{}]", frame.id),
+                     "is damaged (its checksum differs): restore the index from a copy");
   const std::string bytes = read_file_bytes(path);
   const auto stored = static_cast<std::int64_t>(bytes.size());
   if (stored != frame.bytes)

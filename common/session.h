@@ -65,6 +65,7 @@ struct SessionFrame {
   std::string file;                     // below the session's folder
   std::int64_t bytes = 0;               // the file's size
   std::uint32_t crc32 = 0;              // the file's CRC-32, so that damage is never read as light
+  bool damaged = false;                 // this row is not as it was written: read_frame() refuses it
 };
 
 // A frame as its file holds it: what costs time (compression) is done, what is left is writing.
@@ -131,11 +132,15 @@ class SessionReader {
   [[nodiscard]] const std::vector<SessionFrame>& frames() const;    // all, by id
   [[nodiscard]] std::vector<SessionFrame> frames(FrameRole) const;  // of one role, by id
   [[nodiscard]] const std::vector<FrameGap>& gaps() const;          // by next_id
+  // Frames whose files are there, but that the index does not tell of. A recording that runs, or was killed, has those
+  // of its last moments, which were not acknowledged; many mean that session.db-wal is damaged.
+  [[nodiscard]] std::int64_t frames_without_row() const;
   // What write_document() wrote; nothing when there is no such document.
   [[nodiscard]] std::optional<nlohmann::json> document(const std::string& key) const;
   // What was seen while recording, by frame; not every frame was looked at, and imported ones never. Throws InputError.
   [[nodiscard]] std::vector<FrameTags> tags() const;
-  // Throws InputError naming the file when it is missing, truncated, damaged or of another size.
+  // Throws InputError naming the file when it is missing, truncated, damaged or of another size, or the index when the
+  // frame's row is damaged.
   [[nodiscard]] Frame read_frame(const SessionFrame&) const;
 
  private:

@@ -311,10 +311,40 @@ TEST(Session, MissingTruncatedAndDamagedFramesNameTheFile) {
 TEST(Session, AFrameOfAnotherSizeNamesTheFile) {
   const test::TemporaryFolder folder;
   write_session(folder / "s", {}, 1);
+  run_sql(folder / "s", "DROP TABLE document_checks");  // as a session from before there were any
   run_sql(folder / "s", R"(UPDATE meta SET json = replace(json, '"width":36', '"width":40') WHERE key = 'camera')");
   const SessionReader reader(folder / "s");
   const std::string error = input_error_of([&] { (void)reader.read_frame(reader.frames().at(0)); });
   EXPECT_TRUE(contains(error, "frames/000000.tif: has 36 x 28 pixels, the session 40 x 28"));
+}
+
+TEST(Session, AChangedRowIsRefusedAndTheOthersAreRead) {
+  const test::TemporaryFolder folder;
+  write_session(folder / "s", {}, 3);
+  run_sql(folder / "s", "UPDATE frames SET exposure_s = 2 * exposure_s WHERE id = 1");
+  const SessionReader reader(folder / "s");
+  ASSERT_EQ(reader.frames().size(), 3U);
+  EXPECT_NO_THROW((void)reader.read_frame(reader.frames()[0]));
+  EXPECT_NO_THROW((void)reader.read_frame(reader.frames()[2]));
+  EXPECT_TRUE(contains(input_error_of([&] { (void)reader.read_frame(reader.frames()[1]); }),
+                       "session.db: frames[1]: is damaged"));
+}
+
+TEST(Session, AChangedDocumentIsRefused) {
+  const test::TemporaryFolder folder;
+  write_session(folder / "s", {}, 1);
+  run_sql(folder / "s", "UPDATE meta SET json = replace(json, '0.34', '0.35') WHERE key = 'target'");
+  EXPECT_TRUE(contains(input_error_of([&] { SessionReader reader(folder / "s"); }), "session.db: target: is damaged"));
+}
+
+TEST(Session, FramesThatTheIndexDoesNotTellOfAreCounted) {
+  const test::TemporaryFolder folder;
+  SessionWriter writer(folder / "s", header_of({}), {SessionWriter::Durability::batches});
+  writer.append(frame_of({}, 0));
+  writer.commit();
+  EXPECT_EQ(SessionReader(folder / "s").frames_without_row(), 0);
+  writer.append(frame_of({}, 1));
+  EXPECT_EQ(SessionReader(folder / "s").frames_without_row(), 1);
 }
 
 TEST(Session, WhatIsNoSessionIsToldApart) {
