@@ -105,8 +105,13 @@ TagDetector::~TagDetector() = default;
 std::vector<TagDetection> TagDetector::detect(const ImageF& linear) {
   check(linear.channels == 1, "tags are sought in a picture of one channel");
   if (linear.empty()) return {};
-  ImageU8 picture = to_8_bits(impl_->square_root_levels ? square_roots(linear) : linear);
-  image_u8_t view{picture.width, picture.height, picture.width, picture.data.data()};
+  return detect(to_8_bits(impl_->square_root_levels ? square_roots(linear) : linear));
+}
+
+std::vector<TagDetection> TagDetector::detect(ImageU8 levels) {
+  check(levels.channels == 1, "tags are sought in a picture of one channel");
+  if (levels.empty()) return {};
+  image_u8_t view{levels.width, levels.height, levels.width, levels.data.data()};
   const std::unique_ptr<zarray_t, DetectionsDeleter> found(apriltag_detector_detect(impl_->detector.get(), &view));
   std::vector<TagDetection> tags;
   for (int i = 0; i < zarray_size(found.get()); ++i) {

@@ -44,6 +44,10 @@ class TagDetector {
   // shoulder for what is brighter than most of the picture.
   [[nodiscard]] std::vector<TagDetection> detect(const ImageF& linear);
 
+  // The same on eight bits that were stretched already, proportional to radiance where the tags are. By value: AprilTag
+  // blurs in place when it is told to blur.
+  [[nodiscard]] std::vector<TagDetection> detect(ImageU8 levels);
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;

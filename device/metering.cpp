@@ -46,7 +46,7 @@ struct SceneLight {
   double clipped_share = 0;
 };
 
-SceneLight light_of_scene(const FrameLevels& levels, const MeteringState& state, const MeteringOptions& options) {
+SceneLight light_of_scene(const LevelCounts& levels, const MeteringState& state, const MeteringOptions& options) {
   const std::vector<std::uint32_t>& histogram = levels.histogram;
   const double pixels = std::accumulate(histogram.begin(), histogram.end(), 0.0);
   check(pixels > 0, "metering looks at a frame with pixels");
@@ -130,8 +130,8 @@ std::string MeteringOptions::validate() const {
   return {};
 }
 
-FrameLevels frame_levels(const ImageU16& codes, const PixelFormat& format, std::span<const TagDetection> tags) {
-  FrameLevels levels;
+LevelCounts level_counts(const ImageU16& codes, const PixelFormat& format, std::span<const TagDetection> tags) {
+  LevelCounts levels;
   levels.histogram.resize(static_cast<std::size_t>(format.level_count()));
   for (const std::uint16_t code : codes.data)
     ++levels.histogram[std::min<std::size_t>(code, levels.histogram.size() - 1)];
@@ -156,7 +156,7 @@ FrameLevels frame_levels(const ImageU16& codes, const PixelFormat& format, std::
   return levels;
 }
 
-MeteringStep next_setting(const FrameLevels& levels, const MeteringState& state, const MeteringOptions& options) {
+MeteringStep next_setting(const LevelCounts& levels, const MeteringState& state, const MeteringOptions& options) {
   const SceneLight scene = light_of_scene(levels, state, options);
   MeteringStep step;
   step.clipped_share = scene.clipped_share;
@@ -299,7 +299,7 @@ MeteringResult Metering::run() {
     const std::vector<TagDetection> tags =
         find_tags_ ? find_tags_(frame_.codes, state_.curve) : std::vector<TagDetection>{};
     const MeteringStep step =
-        next_setting(frame_levels(frame_.codes, camera_.description().format, tags), state_, options_);
+        next_setting(level_counts(frame_.codes, camera_.description().format, tags), state_, options_);
     result_.clipped_share = step.clipped_share;
     result_.tag_contrast = step.tag_contrast;
     good = step.good ? good + 1 : 0;

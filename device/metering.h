@@ -36,11 +36,11 @@ struct TagLevels {
 };
 
 // What metering needs of a frame.
-struct FrameLevels {
+struct LevelCounts {
   std::vector<std::uint32_t> histogram;  // pixels by code
   std::optional<TagLevels> tags;         // the median tag's
 };
-[[nodiscard]] FrameLevels frame_levels(const ImageU16& codes, const PixelFormat&, std::span<const TagDetection>);
+[[nodiscard]] LevelCounts level_counts(const ImageU16& codes, const PixelFormat&, std::span<const TagDetection>);
 
 struct MeteringState {
   double exposure_s = 0;
@@ -60,7 +60,7 @@ struct MeteringStep {
 
 // The next setting from a frame that was taken with `state`. Without tags, the brighter part of the picture stands for
 // their white. A pure function. Precondition: valid options, a histogram with a pixel.
-[[nodiscard]] MeteringStep next_setting(const FrameLevels&, const MeteringState&, const MeteringOptions&);
+[[nodiscard]] MeteringStep next_setting(const LevelCounts&, const MeteringState&, const MeteringOptions&);
 
 struct MeteringResult {
   double exposure_s = 0;     // read back

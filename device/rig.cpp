@@ -64,7 +64,7 @@ void Rig::watch_light() {
   MeteringState state;
   state.exposure_s = camera.exposure_s;
   state.curve = approximate_response_curve(camera.response, camera.format, options_.metering->black_level);
-  const MeteringStep step = next_setting(frame_levels(spare_.codes, camera.format, {}), state, *options_.metering);
+  const MeteringStep step = next_setting(level_counts(spare_.codes, camera.format, {}), state, *options_.metering);
   const double change = step.exposure_s / camera.exposure_s;
   constexpr double worth_it = 1.5;  // below, the headroom is there for it
   if (!step.good && (change > worth_it || change < 1 / worth_it)) meter();

@@ -13,10 +13,10 @@
 #include "common/check.h"
 #include "common/dense.h"
 #include "common/error.h"
+#include "common/robust_homography.h"
+#include "common/zhang.h"
 #include "host/calibration/bundle_adjustment.h"
-#include "host/calibration/robust_homography.h"
 #include "host/calibration/target_pose.h"
-#include "host/calibration/zhang.h"
 
 namespace mf {
 
@@ -98,7 +98,7 @@ void find_homography(Work& work, double threshold_px) {
   std::vector<TagSighting> tags;
   tags.reserve(plane.size());
   for (const std::size_t i : plane) tags.push_back(work.view.tags[i]);
-  const std::optional<RobustHomography> found = robust_homography(tags, threshold_px);
+  const std::optional<RobustHomography> found = robust_homography(in_plane(tags), threshold_px);
   if (!found) return;
   for (std::size_t i = 0; i < plane.size(); ++i) {
     work.view.tags[plane[i]].inlier = found->tag_is_inlier[i];
@@ -183,7 +183,7 @@ void Calibrator::pose_all() {
     if (best) best = estimate_pose(adjustment_.camera, work.view, best->cam_from_target);
     if (!best) {
       const std::optional<Rigid3> from =
-          pose_from_homography(*work.homography, work.point_on_plane, adjustment_.camera);
+          pose_from_homography(*work.homography, work.point_on_plane, adjustment_.camera.k_matrix());
       if (from) best = estimate_pose(adjustment_.camera, work.view, *from);
     }
     work.pose = best;

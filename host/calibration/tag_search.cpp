@@ -7,7 +7,7 @@
 
 #include "common/check.h"
 #include "common/homography.h"
-#include "host/calibration/robust_homography.h"
+#include "common/robust_homography.h"
 
 namespace mf {
 
@@ -71,7 +71,7 @@ void keep_consistent(std::vector<TagSighting>& found) {
   if (found.size() < 2) return;
   // Strong distortion bends a plane by this many pixels across a picture; ghosts are much further off.
   constexpr double threshold_px = 12;
-  const std::optional<RobustHomography> plane = robust_homography(found, threshold_px);
+  const std::optional<RobustHomography> plane = robust_homography(in_plane(found), threshold_px);
   if (!plane) return;
   std::vector<TagSighting> kept;
   for (std::size_t i = 0; i < found.size(); ++i)

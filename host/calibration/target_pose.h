@@ -5,14 +5,14 @@
 #include <optional>
 
 #include "common/camera_model.h"
-#include "common/homography.h"
+#include "common/plane_pose.h"
 #include "common/rigid3.h"
 #include "host/calibration/target_view.h"
 
 namespace mf {
 
-// How a corner's pixel moves with the camera's parameters and with the pose. The pose moves by a small rotation ω about
-// the target's origin and a shift τ, both along the camera's axes:  x_in_cam = exp(ω) R x + t + τ.
+// How a corner's pixel moves with the camera's parameters and with the pose. The pose moves by a small rotation ω and
+// a shift τ as moved() applies them.
 struct CornerDerivative {
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, CameraModel::parameter_count> by_camera;
@@ -21,7 +21,6 @@ struct CornerDerivative {
 // Nothing when the point is not in front of the camera.
 [[nodiscard]] std::optional<CornerDerivative> corner_derivative(const CameraModel&, const Rigid3& cam_from_target,
                                                                 const Eigen::Vector3d& x_in_target);
-[[nodiscard]] Rigid3 moved(const Rigid3& cam_from_target, const Eigen::Matrix<double, 6, 1>& rotation_and_shift);
 
 // Half the robust sum of squares that calibration minimizes: Σ ρ(rᵀ Λ r) over inlier tags, r the eight corner errors
 // of a tag, Λ its information and ρ Huber's.
@@ -30,12 +29,6 @@ struct CornerDerivative {
 // Every residual beyond this many standard deviations of a tag's eight is damped: χ²(8) exceeds its square once in
 // a thousand.
 inline constexpr double tag_huber_width = 5.1;
-
-// Pose from the homography of a plane of the target, z = const (Zhang 2000, §3.1). `point_in_target` lies in that plane
-// and was seen: it fixes the side of the camera. The camera's distortion is ignored; this is a start for
-// estimate_pose().
-[[nodiscard]] std::optional<Rigid3> pose_from_homography(const Homography& picture_from_plane,
-                                                         const Eigen::Vector3d& point_in_target, const CameraModel&);
 
 struct PoseEstimate {
   Rigid3 cam_from_target;

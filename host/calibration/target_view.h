@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/robust_homography.h"
 #include "host/calibration/tag_refinement.h"
 
 namespace mf {
@@ -18,6 +19,18 @@ struct TagSighting {
   Eigen::Matrix<double, 8, 8> information;  // inverse covariance of the corners, px⁻²: see RefinedTag
   bool inlier = true;
 };
+
+// The tags without their z. Precondition: they lie in one plane of constant z.
+[[nodiscard]] inline std::vector<TagInPlane> in_plane(const std::vector<TagSighting>& tags) {
+  std::vector<TagInPlane> out;
+  out.reserve(tags.size());
+  for (const TagSighting& tag : tags) {
+    TagInPlane flat{{}, tag.corners_px};
+    for (std::size_t k = 0; k < 4; ++k) flat.in_plane[k] = tag.corners_in_target[k].head<2>();
+    out.push_back(flat);
+  }
+  return out;
+}
 
 // A rigid target (the mirror with its frame, or the scene's own tags) as one picture shows it.
 struct TargetView {

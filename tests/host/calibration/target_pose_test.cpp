@@ -5,8 +5,8 @@
 
 #include <numbers>
 
-#include "host/calibration/robust_homography.h"
-#include "host/calibration/zhang.h"
+#include "common/robust_homography.h"
+#include "common/zhang.h"
 #include "tests/host/calibration/synthetic_views.h"
 
 namespace mf {
@@ -85,10 +85,10 @@ TEST(Zhang, ClosedFormIsExactWithoutNoise) {
   for (int i = 0; i < 5; ++i) {
     const TargetView view =
         seen(camera, framed_mirror(), facing_pose(1, 0.3 + 0.05 * i, 1.1 * i, {0.03 * i, 0}), 0, random);
-    const std::optional<RobustHomography> h = robust_homography(view.tags, 1);
+    const std::optional<RobustHomography> h = robust_homography(in_plane(view.tags), 1);
     ASSERT_TRUE(h);
     homographies.push_back(h->picture_from_plane);
-    const std::optional<Rigid3> pose = pose_from_homography(h->picture_from_plane, {0, 0, 0}, camera);
+    const std::optional<Rigid3> pose = pose_from_homography(h->picture_from_plane, {0, 0, 0}, camera.k_matrix());
     ASSERT_TRUE(pose);
     EXPECT_LT(rotation_angle_between(*pose, facing_pose(1, 0.3 + 0.05 * i, 1.1 * i, {0, 0})), 1e-6);
   }
@@ -108,7 +108,7 @@ TEST(RobustHomography, IgnoresTagsReadWrong) {
   TargetView view = seen(ordinary_camera(), framed_mirror(), facing_pose(1, 0.4, 1, {0, 0}), 0.2, random);
   for (const std::size_t bad : {1U, 7U, 12U, 19U})
     for (Eigen::Vector2d& corner : view.tags[bad].corners_px) corner += Eigen::Vector2d(60, -25);
-  const std::optional<RobustHomography> h = robust_homography(view.tags, 3);
+  const std::optional<RobustHomography> h = robust_homography(in_plane(view.tags), 3);
   ASSERT_TRUE(h);
   for (std::size_t i = 0; i < view.tags.size(); ++i)
     EXPECT_EQ(h->tag_is_inlier[i], i != 1 && i != 7 && i != 12 && i != 19) << i;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/calibration/zhang.h"
+#include "common/zhang.h"
 
 #include <Eigen/Core>
 #include <algorithm>
