@@ -11,6 +11,7 @@
 #include "common/check.h"
 #include "common/error.h"
 #include "device/aravis_features.h"
+#include "device/aravis_handles.h"
 #include "device/clock.h"
 #include "device/pixel_packing.h"
 
