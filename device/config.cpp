@@ -31,6 +31,26 @@ std::optional<MeteringOptions> read_metering_config(ConfigTable table, double bl
   return wanted ? std::optional(m) : std::nullopt;
 }
 
+std::optional<LookoutOptions> read_detection_config(ConfigTable table) {
+  const bool wanted = table.flag("on").value_or(true);
+  LookoutOptions o;
+  o.detection.duty = table.number("duty", 0.01, 1).value_or(o.detection.duty);
+  o.detection.detector.quad_decimate = table.number("quad_decimate", 1, 8).value_or(o.detection.detector.quad_decimate);
+  if (const auto calibration = table.path("calibration")) o.camera = read_camera_model(*calibration);
+  table.refuse_unknown_keys();
+  return wanted ? std::optional(o) : std::nullopt;
+}
+
+std::optional<LightPlane> read_plane_config(ConfigTable table) {
+  const auto centre = table.numbers("centre_m", -100, 100);
+  const auto size = table.numbers("size_m", 1e-3, 100);
+  table.refuse_unknown_keys();
+  if (!centre && !size) return std::nullopt;
+  if (!centre || centre->size() != 2) table.fail("centre_m", "must be [x, y], in the world");
+  if (!size || size->size() != 2) table.fail("size_m", "must be [width, height]");
+  return LightPlane{{(*centre)[0], (*centre)[1]}, {(*size)[0], (*size)[1]}};
+}
+
 }  // namespace
 
 DeviceConfig read_device_config(const fs::path& file) {
@@ -49,6 +69,9 @@ DeviceConfig read_device_config(const fs::path& file) {
   config.recorder.queue_frames = recording.integer("queue_frames", 2, 10000).value_or(config.recorder.queue_frames);
   recording.refuse_unknown_keys();
   config.metering = read_metering_config(ConfigTable(root, "metering", file.string()), config.black_level_hint);
+  config.lookout = read_detection_config(ConfigTable(root, "detection", file.string()));
+  const std::optional<LightPlane> plane = read_plane_config(ConfigTable(root, "plane", file.string()));
+  if (config.lookout) config.lookout->plane = plane;
   config.operating = read_operator_config(root, file.string());
   config.status = read_status_config(ConfigTable(root, "status", file.string()));
   return config;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "device/camera_source.h"
+#include "device/lookout.h"
 #include "device/machine_check.h"
 #include "device/metering.h"
 #include "device/operator_config.h"
@@ -23,6 +24,7 @@ struct DeviceConfig {
   std::filesystem::path recordings;            // sessions are made below it
   RecorderOptions recorder;
   std::optional<MeteringOptions> metering;  // nothing: exposure and response stay as [camera] and [response] say
+  std::optional<LookoutOptions> lookout;    // nothing: frames are recorded unseen
   OperatorConfig operating;
   StatusConfig status;
 };

@@ -39,6 +39,7 @@ RigOptions rig_options(const DeviceConfig& config, const DaemonOptions& o) {
   r.header = header_of(config);
   r.recorder = config.recorder;
   r.metering = config.metering;
+  r.lookout = config.lookout;
   r.most_seconds = o.most_seconds;
   return r;
 }

@@ -17,7 +17,7 @@ ButtonTiming read_timing(ConfigTable& table) {
 
 StartButtonOptions read_button(ConfigTable table) {
   StartButtonOptions o;
-  o.udev_tag = table.text("udev_tag").value_or(o.udev_tag);
+  o.udev_tag = table.text("tag").value_or(o.udev_tag);
   o.key = table.text("key").value_or(o.key);
   o.timing = read_timing(table);
   table.refuse_unknown_keys();

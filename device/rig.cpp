@@ -41,21 +41,36 @@ Rig::Rig(OpenCamera open, const RigOptions& options, RigLinks links)
   spare_.codes = ImageU16(camera.width, camera.height, 1);
   status_.camera = fmt::format("{} {} {}", camera.vendor, camera.model, camera.serial);
   status_.queue_frames = options.recorder.queue_frames;
-  meter();
+  if (options.metering)
+    meter();
+  else
+    look_out();
+}
+
+// Detection needs the response that is in force.
+void Rig::look_out() {
+  if (!options_.lookout) return;
+  const CameraDescription& camera = keeper_.description();
+  const double black_level = options_.header.black_level_hint;
+  lookout_.reset();  // the old one's thread ends first
+  lookout_ = std::make_unique<Lookout>(*options_.lookout, options_.header.target, options_.header.world,
+                                       approximate_response_curve(camera.response, camera.format, black_level),
+                                       camera.format, camera.width, camera.height);
 }
 
 void Rig::meter() {
-  if (!options_.metering) return;
   const RigState before = std::exchange(status_.state, RigState::metering);
   tell_now();
   const std::optional<MeteringResult> result = keeper_.meter(*options_.metering, {});
   status_.state = before;
   if (result) camera_remark_ = result->remarks.empty() ? "" : result->remarks.front();
+  look_out();
   looked_ = RigClock::now();
   told_ = {};
 }
 
-// Between recordings: meters anew when what comes would no longer be exposed well.
+// Between recordings: meters anew when what comes is brighter than what was metered. When it is darker the settings
+// stay: who shows the lamp in the mirror, and puts the mirror aside then, wants them for the lamp.
 void Rig::watch_light() {
   constexpr double look_each_s = 1;
   if (!options_.metering || seconds_since(looked_) < look_each_s) return;
@@ -65,9 +80,18 @@ void Rig::watch_light() {
   state.exposure_s = camera.exposure_s;
   state.curve = approximate_response_curve(camera.response, camera.format, options_.metering->black_level);
   const MeteringStep step = next_setting(level_counts(spare_.codes, camera.format, {}), state, *options_.metering);
-  const double change = step.exposure_s / camera.exposure_s;
-  constexpr double worth_it = 1.5;  // below, the headroom is there for it
-  if (!step.good && (change > worth_it || change < 1 / worth_it)) meter();
+  if (step.clipped_share > options_.metering->clipped_share) meter();
+}
+
+// A queue that fills sheds the looking before anything that is recorded.
+bool Rig::has_time_to_look() const {
+  return !recording_ || recording_->status().queued < options_.recorder.queue_frames / 4;
+}
+
+void Rig::note_sights() {
+  if (!lookout_) return;
+  for (Sight& sight : lookout_->take_sights())
+    if (recording_) recording_->note_tags(sight.arrival, std::move(sight.tags), sight.cam_from_mirror);
 }
 
 void Rig::step() {
@@ -75,9 +99,15 @@ void Rig::step() {
     if (const auto command = links_.next_command()) obey(*command);
   CameraFrame& into = recording_ ? recording_->next_buffer() : spare_;
   const Received received = keeper_.receive(into, std::chrono::milliseconds(100));
-  if (received == Received::frame) ++frames_;
+  if (received == Received::frame) {
+    ++frames_;
+    if (lookout_ && has_time_to_look()) lookout_->offer(into);
+  }
+  note_sights();
   if (recording_) {
-    recording_->take(received);
+    const bool scene = scene_comes_ && received == Received::frame;
+    recording_->take(received, scene ? FrameRole::scene : FrameRole::mirror);
+    scene_comes_ = scene_comes_ && !scene;
     watch_recording();
   } else if (received == Received::frame) {
     watch_light();
@@ -109,6 +139,8 @@ void Rig::start() {
 void Rig::begin(const std::filesystem::path& session) {
   recording_.emplace(session, options_.header, keeper_.description(), options_.recorder);
   status_.session = session.string();
+  scene_comes_ = lookout_ && lookout_->mirror_in_view() == false;
+  if (lookout_) lookout_->begin_recording();
   const CameraDescription& camera = keeper_.description();
   if (const auto curve = response_curve_of(camera.response, camera.format, options_.header.black_level_hint))
     write_json_file(session / "response.json", to_json(*curve));
@@ -180,6 +212,7 @@ void Rig::tell_regularly() {
     status_.temperature_c = board_temperature_c();
   }
   status_.exposure_s = keeper_.description().exposure_s;
+  if (lookout_) lookout_->describe(status_);
   tell_now();
 }
 

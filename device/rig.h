@@ -4,10 +4,12 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "device/camera_keeper.h"
+#include "device/lookout.h"
 #include "device/recording.h"
 #include "device/rig_status.h"
 
@@ -23,6 +25,7 @@ struct RigOptions {
   double most_seconds = 0;                     // of a recording; 0: until stopped
   std::int64_t least_free_bytes = 64 << 20;    // with less, a recording is not begun
   std::optional<MeteringOptions> metering;     // nothing: the camera stays as it was opened
+  std::optional<LookoutOptions> lookout;       // nothing: frames are recorded unseen
 };
 
 enum class RigCommand { start, stop };
@@ -37,6 +40,8 @@ struct RigLinks {
 //
 //   metering ──▶ idle ──start──▶ recording ──stop──▶ done ──start──▶ recording ...
 //                                    └── the disk or the camera's settings fail ──▶ error ──start──▶ recording ...
+//
+// The recording's first frame is its scene picture when the mirror was out of view at the start.
 //
 // It meters when the camera is there, and again between recordings when the light has changed; from the start of a
 // recording to its end everything stays as it is. A recording of a camera whose response is known brings its
@@ -69,18 +74,23 @@ class Rig {
   void tell_now();
   void meter();
   void watch_light();
+  void look_out();
+  void note_sights();
+  [[nodiscard]] bool has_time_to_look() const;
 
   CameraKeeper keeper_;
   RigOptions options_;
   RigLinks links_;
   RigStatus status_;
-  CameraFrame spare_;  // received into while nothing is recorded
+  std::unique_ptr<Lookout> lookout_;  // made anew when the camera's response changes
+  CameraFrame spare_;                 // received into while nothing is recorded
   std::optional<Recording> recording_;
   std::chrono::steady_clock::time_point began_;  // the recording, over all its sessions
   std::chrono::steady_clock::time_point told_;
   int continuations_ = 0;
-  std::string alarm_;        // stays until the next start
-  std::int64_t frames_ = 0;  // since the rate was taken last
+  bool scene_comes_ = false;  // the next frame is the scene picture
+  std::string alarm_;         // stays until the next start
+  std::int64_t frames_ = 0;   // since the rate was taken last
   std::chrono::steady_clock::time_point rated_;
   std::chrono::steady_clock::time_point looked_;  // at the light
   std::string camera_remark_;                     // of the metering; stays until the next
