@@ -17,7 +17,11 @@ void Player::expose(const GigeShot& shot, std::span<std::uint8_t> into) {
     sensor_.emplace(traits_, response_, gain_db_);
   }
   const bool waving = begun_ && !ended();
-  const PlayedFrame now{shot.number, waving ? next_.load() : -1, clock_ns(CLOCK_MONOTONIC), shot.exposure_s};
+  const PlayedFrame now{shot.number,
+                        waving    ? next_.load()
+                        : ended() ? Take::without_mirror
+                                  : waiting_frame_.load(),
+                        clock_ns(CLOCK_MONOTONIC), shot.exposure_s};
   take_->light(now.take_frame, light_);
   codes_.resize(light_.data.size());
   sensor_->expose(light_, shot.exposure_s, mix(seed_, shot.number), codes_);

@@ -17,20 +17,22 @@ namespace mf::sim {
 
 // Which frame of the take a camera's frame showed, and how it was set.
 struct PlayedFrame {
-  std::uint64_t number = 0;       // the camera's count over its whole life
-  int take_frame = -1;            // −1: the scene without the mirror
+  std::uint64_t number = 0;  // the camera's count over its whole life
+  int take_frame = Take::without_mirror;
   std::int64_t monotonic_ns = 0;  // CLOCK_MONOTONIC when it was exposed
   double exposure_s = 0;
 };
 
-// Plays a take through a camera: the still scene, until begin(); then the mirror's frames one after the other; then the
-// still scene again. Give it to a GigeCamera: `[&](const GigeShot& s, auto into) { player.expose(s, into); }`.
+// Plays a take through a camera: the lamp in the mirror, which is then put aside; the still scene, until begin(); then
+// the mirror's frames one after the other; then the still scene again. Give it to a GigeCamera: `[&](const GigeShot& s,
+// auto into) { player.expose(s, into); }`.
 class Player {
  public:
   // The take outlives it.
   Player(const Take&, const SensorTraits&, std::uint64_t seed);
 
   void expose(const GigeShot&, std::span<std::uint8_t> into);
+  void put_mirror_aside() { waiting_frame_ = Take::without_mirror; }
   void begin() { begun_ = true; }
   [[nodiscard]] bool ended() const { return next_ >= take_->frames(); }
   [[nodiscard]] std::vector<PlayedFrame> played() const;
@@ -40,6 +42,7 @@ class Player {
   SensorTraits traits_;
   std::uint64_t seed_;
   std::atomic<bool> begun_ = false;
+  std::atomic<int> waiting_frame_ = Take::lamp_shown;
   std::atomic<int> next_ = 0;
   // The camera's thread's own.
   std::optional<FastSensor> sensor_;

@@ -220,6 +220,9 @@ void Run::apply_faults(double now_s) {
 ScenarioResult Run::play() {
   constexpr double at_most_s = 20;
   wait_until("it has told nothing on its socket", at_most_s, [&] { return listener_.connected(); });
+  wait_until("it does not meter", at_most_s,
+             [&] { return told_ != RigState::metering && listener_.latest().frame_rate_hz > 0; });
+  player_.put_mirror_aside();
   const RunClock::time_point met = RunClock::now();
   wait_until("no frames come", at_most_s + scenario_.lead_s,
              [&] { return seconds_since(met) >= scenario_.lead_s && listener_.latest().frame_rate_hz > 0; });

@@ -51,6 +51,13 @@ Take::Take(const DeskRig& rig, const TakeOptions& options, const SensorTraits& t
   scene_ = render(rig.tracer, rig.shot(std::nullopt, whole(rig.camera), options.scene_samples,
                                        stream_key(options.seed, Stream::plate)));
   still_ = sensor_mosaic(scene_, traits);
+  const Eigen::Vector3d middle(0, 0.02, 0);
+  const Rigid3 facing_lamp = mirror_pose(rig.motion, middle, (rig.motion.lamp_in_world - middle).normalized(), 0);
+  lamp_ =
+      trace(rig,
+            rig.shot(facing_lamp, around_plate(rig.camera, rig.cam_from_world * facing_lamp, rig.plate.half_size_m()),
+                     options.samples, stream_key(options.seed, Stream::sweep)),
+            traits);
   poses_ = wave_mirror(rig.motion, options.frames, options.seed);
   for (std::size_t i = 0; i < poses_.size(); ++i) {
     const std::vector<Rigid3> mirrors = options.blur > 0 ? places(poses_, i, options.blur) : std::vector{poses_[i]};
@@ -59,16 +66,20 @@ Take::Take(const DeskRig& rig, const TakeOptions& options, const SensorTraits& t
     Shot shot = rig.shot(mirrors.front(), region, options.samples,
                          stream_key(options.seed, Stream::frame, static_cast<int>(i)));
     shot.later.assign(mirrors.begin() + 1, mirrors.end());
-    patches_.push_back({region, crop(sensor_mosaic(render(rig.tracer, shot), traits), region)});
+    patches_.push_back(trace(rig, shot, traits));
     report_progress(progress, "frames", (static_cast<double>(i) + 1) / static_cast<double>(poses_.size()));
   }
 }
 
+Take::Patch Take::trace(const DeskRig& rig, const Shot& shot, const SensorTraits& traits) {
+  return {shot.region, crop(sensor_mosaic(render(rig.tracer, shot), traits), shot.region)};
+}
+
 void Take::light(int frame, ImageF& into) const {
-  check(frame >= -1 && frame < frames(), "the take has this frame");
+  check(frame >= lamp_shown && frame < frames(), "the take has this frame");
   into = still_;
-  if (frame < 0) return;
-  const Patch& patch = patches_[static_cast<std::size_t>(frame)];
+  if (frame == without_mirror) return;
+  const Patch& patch = frame == lamp_shown ? lamp_ : patches_[static_cast<std::size_t>(frame)];
   for (int y = 0; y < patch.light.height; ++y)
     std::copy_n(&patch.light.at(0, y), patch.light.width, &into.at(patch.region.x0, patch.region.y0 + y));
 }

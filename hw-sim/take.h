@@ -26,9 +26,12 @@ struct TakeOptions {
 };
 
 // What the rig's camera sees of one waving of the mirror, as light, before any sensor: traced once, then exposed as
-// often as a camera sends it. Frame −1 is the scene without the mirror.
+// often as a camera sends it.
 class Take {
  public:
+  static constexpr int without_mirror = -1;
+  static constexpr int lamp_shown = -2;  // the mirror, held so that the camera sees the lamp in it: to be metered
+
   // Throws InputError for options that are wrong.
   Take(const DeskRig&, const TakeOptions&, const SensorTraits&, const Progress&);
 
@@ -37,7 +40,7 @@ class Take {
   [[nodiscard]] const std::vector<Rigid3>& poses() const { return poses_; }
   // The scene without the mirror, three channels of radiance, without the lens' vignetting.
   [[nodiscard]] const ImageF& scene() const { return scene_; }
-  // What reaches the sensor's pixels (sensor_mosaic()). Precondition: −1 ≤ frame < frames(). Cheap: a copy.
+  // What reaches the sensor's pixels (sensor_mosaic()). Precondition: −2 ≤ frame < frames(). Cheap: a copy.
   void light(int frame, ImageF& into) const;
 
  private:
@@ -45,8 +48,10 @@ class Take {
     Region region;
     ImageF light;  // of the region's pixels
   };
+  [[nodiscard]] static Patch trace(const DeskRig&, const Shot&, const SensorTraits&);
   ImageF scene_;
   ImageF still_;  // its mosaic
+  Patch lamp_;
   std::vector<Rigid3> poses_;
   std::vector<Patch> patches_;  // where the mirror changes it
 };

@@ -13,6 +13,7 @@
 #include "host/calibration/session_targets.h"
 #include "host/cli/command.h"
 #include "host/cli/run_resample.h"
+#include "host/cli/session_files.h"
 #include "host/io/exr.h"
 #include "host/io/image_file.h"
 #include "host/light_field/probe.h"
@@ -47,8 +48,11 @@ auto timed(std::map<std::string, double>& seconds, const std::string& name, cons
   return result;
 }
 
+// A rig that knows its camera's response brings response.json along, instead of a sweep.
 ResponseCurve estimate_response(const SessionReader& session, const PhotometryOptions& options,
                                 const Progress& progress) {
+  if (!options.linear && session.frames(FrameRole::sweep).empty() && fs::exists(session.folder() / "response.json"))
+    return response_of(session);
   const PhotometryResult result = photometry(session, options, progress);
   write_json_file(session.folder() / "response.json", response_json(result, options));
   return result.curve;
