@@ -15,6 +15,7 @@ void add_import_command(CommandLine& program);
 void add_photometry_command(CommandLine& program);
 void add_calibrate_command(CommandLine& program);
 void add_resample_command(CommandLine& program);
+void add_plate_command(CommandLine& program);
 void add_probe_command(CommandLine& program);
 void add_render_command(CommandLine& program);
 void add_composite_command(CommandLine& program);

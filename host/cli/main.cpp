@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   mf::add_photometry_command(program);
   mf::add_calibrate_command(program);
   mf::add_resample_command(program);
+  mf::add_plate_command(program);
   mf::add_probe_command(program);
   mf::add_render_command(program);
   mf::add_composite_command(program);
