@@ -102,6 +102,7 @@ void Coverage::cast(const Rigid3& world_from_mirror, int columns, int rows) {
       const Vector2d in_opening = inside * Vector2d((c + 0.5) / columns - 0.5, (r + 0.5) / rows - 0.5);
       const Vector2d m = in_opening.cwiseProduct(reach_.opening_m());
       RaySeen ray;
+      ray.on_rim = r == 0 || c == 0 || r == rows - 1 || c == columns - 1;
       ray.on_mirror = world_from_mirror.translation + rotation.leftCols<2>() * m;
       ray.unit = (ray.on_mirror - centre).normalized();
       constexpr double horizon = 0.02;  // flatter rays cross the plane nowhere near
@@ -130,7 +131,7 @@ void Coverage::add(const Rigid3& cam_from_mirror, const ImageF& luminance, int r
     const Vector2d pixel = reach_.camera().project(in_cam) / reduction;
     if (!(pixel.minCoeff() >= 0) || pixel.x() >= luminance.width || pixel.y() >= luminance.height) continue;
     const float value = luminance.at(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
-    radiance_.add(ray.on_plane, ray.unit, std::max(0.0, static_cast<double>(value)));
+    if (!ray.on_rim) radiance_.add(ray.on_plane, ray.unit, std::max(0.0, static_cast<double>(value)));
     if (ray.cell < 0) continue;
     const std::size_t pair = pair_of(ray.direction, ray.cell);
     if (stamp_[pair] == now_) continue;
@@ -176,33 +177,46 @@ void Coverage::evaluate() {
 
 void Coverage::evaluate_direction(int d, double mean_radiance, double light) {
   const double reach_m = options_.reach * options_.plane.size_m.minCoeff();
+  const double whole_plane_m = options_.plane.size_m.norm();
   const double omega = grid_.projected_solid_angle(d);
-  const int patch = grid_.patch_of(d);
-  for (int cell = 0; cell < cell_count(); ++cell) {
+  const int cells = cell_count();
+  const auto row = seen_.begin() + static_cast<std::ptrdiff_t>(pair_of(d, 0));
+  const int views_anywhere = std::accumulate(row, row + cells, 0);
+  float mended_anywhere = 0;
+  for (int cell = 0; cell < cells; ++cell) {
     const std::size_t pair = pair_of(d, cell);
     covered_ij_[pair] = 0;
     if (!(weight_[pair] > 0)) continue;
     const double relative = static_cast<double>(weight_[pair]) / omega / mean_radiance;
     const double near_m = reach_m / relative;
     const int needed = relative >= options_.bright ? 2 : 1;
-    const std::vector<int>& around = neighbours_[static_cast<std::size_t>(cell)];
-    int views = 0;
-    std::size_t within = 0;  // cells
-    for (; within < around.size(); ++within) {
-      const int other = around[within];
-      if (within > 0 && apart_m_[pair_of(cell, other)] > near_m) break;
-      views += seen_[pair_of(d, other)];
-    }
+    const bool anywhere = near_m >= whole_plane_m;
+    const std::span<const int> near = anywhere ? std::span<const int>() : cells_within(cell, near_m);
+    int views = anywhere ? views_anywhere : 0;
+    for (const int other : near) views += seen_[pair_of(d, other)];
     const double c = std::min(1.0, static_cast<double>(views) / needed);
     covered_ij_[pair] = static_cast<float>(c);
     const double share = static_cast<double>(weight_[pair]) / light;
     covered_ += share * c;
     if (c >= 1) continue;
     const auto mended = static_cast<float>(share / needed);
-    if (within == 1) own_[pair] = mended;
-    for (std::size_t k = 0; within > 1 && k < within; ++k) wide_[pair_of(d, around[k])] += mended;
-    for (std::size_t k = 0; k < within; ++k) wanted_[pair_of(patch, around[k])] += mended;
+    if (anywhere) mended_anywhere += mended;
+    std::vector<float>& mends = near.size() == 1 ? own_ : wide_;
+    for (const int other : near) mends[pair_of(d, other)] += mended;
   }
+  for (int cell = 0; cell < cells; ++cell) {
+    const std::size_t pair = pair_of(d, cell);
+    wide_[pair] += mended_anywhere;
+    wanted_[pair_of(grid_.patch_of(d), cell)] += own_[pair] + wide_[pair];
+  }
+}
+
+// The cell itself, and those whose middles are so near.
+std::span<const int> Coverage::cells_within(int cell, double near_m) const {
+  const std::vector<int>& around = neighbours_[static_cast<std::size_t>(cell)];
+  std::size_t count = 1;
+  while (count < around.size() && apart_m_[pair_of(cell, around[count])] <= near_m) ++count;
+  return {around.data(), count};
 }
 
 void Coverage::report_patches(double light) {

@@ -85,6 +85,7 @@ class Coverage {
  private:
   struct RaySeen {
     int direction = 0;
+    bool on_rim = false;       // of the opening: a pixel of a reduced picture is half paper there
     int cell = -1;             // −1: beside the plane
     Eigen::Vector3d on_plane;  // from the plane's centre
     Eigen::Vector3d unit;
@@ -97,6 +98,7 @@ class Coverage {
            static_cast<std::size_t>(cell);
   }
   [[nodiscard]] Eigen::Vector3d cell_in_plane(int cell) const;  // from the plane's centre
+  [[nodiscard]] std::span<const int> cells_within(int cell, double near_m) const;
   void find_places();
   void evaluate();
   void evaluate_direction(int direction, double mean_radiance, double light);
@@ -123,7 +125,7 @@ class Coverage {
   std::vector<float> covered_ij_;
   std::vector<float> own_;     // missing that only a view through this very cell mends, by direction and cell
   std::vector<float> wide_;    // missing in all cells that a view through this one would mend
-  std::vector<float> widest_;    // gain()'s own, by direction
+  std::vector<float> widest_;  // gain()'s own, by direction
   std::vector<float> wanted_;  // by patch and cell
   std::vector<CoveragePatch> patches_;
   double covered_ = 0;

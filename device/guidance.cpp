@@ -134,24 +134,24 @@ std::optional<Guidance::Place> Guidance::best_place(Coverage& coverage, const Ri
 }
 
 void Guidance::choose(Coverage& coverage, const Rigid3& here, double seconds) {
-  constexpr double search_each_s = 0.3;
+  constexpr double choose_each_s = 0.25;  // it is the dearer part
+  if (seconds - last_search_s_ < choose_each_s) return;
+  last_search_s_ = seconds;
   const double still = place_ ? coverage.gain({&place_->world_from_mirror, 1}) : 0;
   constexpr double seen_share = 0.5;  // of the promise that is left when the place is as good as seen
   const bool spent = !place_ || still < seen_share * place_->promised;
   const bool late = place_ && seconds - place_->since_s > options_.patience_s;
   if (late) given_up_[place_->patch] = seconds;
-  if (!spent && !late && seconds - last_search_s_ < search_each_s) return;
-  last_search_s_ = seconds;
-  std::optional<Place> found = best_place(coverage, here, seconds);
+  const std::optional<Place> found = best_place(coverage, here, seconds);
   if (!found) {
-    if (spent || late) place_.reset();
-    if (spent || late) given_up_.clear();  // nothing else is left: try them again
+    if (!spent && !late) return;
+    place_.reset();
+    given_up_.clear();  // nothing else is left: try them again
     return;
   }
   const auto rate_to = [&](const Rigid3& there) { return coverage.gain(way(here, there)) / travel_s(here, there); };
-  const double rate = rate_to(found->world_from_mirror);
-  const double rate_still = place_ ? rate_to(place_->world_from_mirror) : 0;
-  if (spent || late || rate > options_.better * rate_still) place_ = found;
+  if (spent || late || rate_to(found->world_from_mirror) > options_.better * rate_to(place_->world_from_mirror))
+    place_ = found;
 }
 
 HandMotion Guidance::towards(const Rigid3& from, const Rigid3& to) const {

@@ -37,8 +37,8 @@ TEST(GuidedCaptureLong, NeedsAtMostThreeFifthsOfTheFrames) {
                              Scene{"windows and sky", windows_and_sky()}, Scene{"uniform", uniform_light()}}) {
     std::vector<double> ratios, guided_frames, random_frames;
     for (unsigned seed = 1; seed <= seeds; ++seed) {
-      const Waved guided = wave(Waving::guided, scene.light, seed, most_frames);
-      const Waved random = wave(Waving::random, scene.light, seed, most_frames);
+      const Waved guided = wave(Waving::guided, scene.light, desk_coverage(), seed, most_frames);
+      const Waved random = wave(Waving::random, scene.light, desk_coverage(), seed, most_frames);
       EXPECT_TRUE(guided.reached) << scene.name << " " << seed;
       guided_frames.push_back(guided.frames);
       random_frames.push_back(random.frames);

@@ -18,7 +18,8 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr double hand_m_s = 0.5, hand_rad_s = 60 * degree;
 constexpr double slow_m_s = 0.12, slow_rad_s = 20 * degree;  // "a little"
 constexpr std::size_t lag_frames = 3;                        // a quarter of a second
-constexpr int reduction = 16;
+constexpr int reduction = 8;
+constexpr int look_each = 4;  // frames
 
 double hit_globe(const Vector3d& at, const Vector3d& from, const Vector3d& centre, double radius) {
   const Vector3d to = centre - at;
@@ -67,8 +68,16 @@ ImageF mirrored(const MirrorReach& reach, const Rigid3& world_from_mirror, const
   const Vector3d centre = virtual_centre(reach.camera_in_world(), world_from_mirror);
   const Vector3d normal = cam_from_mirror.rotation * Vector3d::UnitZ();
   const Rigid3 mirror_from_cam = cam_from_mirror.inverse();
-  for (int y = 0; y < out.height; ++y)
-    for (int x = 0; x < out.width; ++x) {
+  Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);  // of the opening, in pixels of the small picture
+  for (const double x : {-0.5, 0.5})
+    for (const double y : {-0.5, 0.5}) {
+      const Vector3d corner = cam_from_mirror * Vector3d(x * reach.opening_m().x(), y * reach.opening_m().y(), 0);
+      const Eigen::Vector2d pixel = camera.project(corner) / times;
+      low = low.cwiseMin(pixel), high = high.cwiseMax(pixel);
+    }
+  const auto from = [](double v) { return std::max(0, static_cast<int>(v)); };
+  for (int y = from(low.y()); y < std::min<double>(out.height, high.y()); ++y)
+    for (int x = from(low.x()); x < std::min<double>(out.width, high.x()); ++x) {
       const Vector3d ray((times * (x + 0.5) - camera.cx()) / camera.fx(),
                          (times * (y + 0.5) - camera.cy()) / camera.fy(), 1);
       const double t = normal.dot(cam_from_mirror.translation) / normal.dot(ray);
@@ -168,9 +177,9 @@ class Counting {
   bool frame(const MirrorReach& reach, Coverage& coverage, const Rigid3& held) {
     if (reach.allows(held))
       coverage.add(reach.cam_from_world() * held, mirrored(reach, held, light_, reduction), reduction);
+    if (out.frames++ % look_each != 0) return false;
     const CoverageStatus status = coverage.status();
     out.covered.push_back(status.covered);
-    ++out.frames;
     if (look_) look_(out.frames, status);
     out.reached = status.done;
     return status.done;
@@ -184,10 +193,9 @@ class Counting {
 
 }  // namespace
 
-Waved wave(Waving how, const Surroundings& light, unsigned seed, int most_frames,
+Waved wave(Waving how, const Surroundings& light, const CoverageOptions& options, unsigned seed, int most_frames,
            const std::function<void(int, const CoverageStatus&)>& look) {
   const MirrorReach reach = desk_reach();
-  const CoverageOptions options = desk_coverage();
   Coverage coverage(options, reach);
   Guidance guidance;
   Hand hand(reach, seed);

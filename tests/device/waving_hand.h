@@ -64,10 +64,10 @@ enum class Waving { random, guided };
 struct Waved {
   int frames = 0;  // until 95 % were covered, or all
   bool reached = false;
-  std::vector<double> covered;  // after each frame
+  std::vector<double> covered;  // after every fourth frame
 };
-// `look` is called after each frame, when given.
-[[nodiscard]] Waved wave(Waving, const Surroundings&, unsigned seed, int most_frames,
+// `look` is called after every fourth frame, when given.
+[[nodiscard]] Waved wave(Waving, const Surroundings&, const CoverageOptions&, unsigned seed, int most_frames,
                          const std::function<void(int, const CoverageStatus&)>& look = {});
 // The same for poses that are given (in the world).
 [[nodiscard]] Waved wave(const std::vector<Rigid3>& world_from_mirror, const Surroundings&,
