@@ -123,6 +123,7 @@ void Rig::obey(RigCommand command) {
 void Rig::start() {
   alarm_.clear();
   continuations_ = 0;
+  before_ = {};
   status_.lost_frames = status_.gaps = status_.durable_frames = 0;
   began_ = RigClock::now();
   try {
@@ -131,6 +132,8 @@ void Rig::start() {
       throw InputError(options_.recordings.string(), "",
                        fmt::format("has {} MB left: free some space before recording", free >> 20));
     begin(options_.session ? *std::exchange(options_.session, std::nullopt) : new_session(options_.recordings));
+    scene_comes_ = lookout_ && lookout_->mirror_in_view() == false;
+    if (lookout_) lookout_->begin_recording();
   } catch (const InputError& e) {
     end(RigState::error, e.what());
   }
@@ -139,8 +142,6 @@ void Rig::start() {
 void Rig::begin(const std::filesystem::path& session) {
   recording_.emplace(session, options_.header, keeper_.description(), options_.recorder);
   status_.session = session.string();
-  scene_comes_ = lookout_ && lookout_->mirror_in_view() == false;
-  if (lookout_) lookout_->begin_recording();
   const CameraDescription& camera = keeper_.description();
   if (const auto curve = response_curve_of(camera.response, camera.format, options_.header.black_level_hint))
     write_json_file(session / "response.json", to_json(*curve));
@@ -160,9 +161,9 @@ void Rig::end(RigState state, const std::string& problem) {
 }
 
 void Rig::note(const RecorderStatus& r) {
-  status_.durable_frames = r.durable;
-  status_.lost_frames = r.lost;
-  status_.gaps = r.gaps;
+  status_.durable_frames = before_.durable + r.durable;
+  status_.lost_frames = before_.lost + r.lost;
+  status_.gaps = before_.gaps + r.gaps;
   status_.queued = r.queued;
   status_.seconds = seconds_since(began_);
   if (r.written_anew > 0)
@@ -188,8 +189,11 @@ void Rig::watch_recording() {
 void Rig::go_on_elsewhere(const RecorderStatus& failed) {
   constexpr int most_continuations = 5;  // then the disk is no disk any more
   const std::filesystem::path before = recording_->session();
-  recording_->finish();
+  const RecorderStatus last = recording_->finish();
   recording_.reset();
+  before_.durable += last.durable;
+  before_.lost += last.lost;
+  before_.gaps += last.gaps + 1;  // the change itself
   if (++continuations_ > most_continuations) return end(RigState::error, *failed.failure);
   try {
     const std::string base = before.string().substr(0, before.string().size() - (continuations_ > 1 ? 2 : 0));

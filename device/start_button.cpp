@@ -205,6 +205,7 @@ void EvdevButton::wait_until(std::int64_t time_ns) {
 std::optional<ButtonEvent> EvdevButton::poll(std::chrono::milliseconds at_most) {
   const std::int64_t until_ns = clock_ns(CLOCK_MONOTONIC) + std::chrono::nanoseconds(at_most).count();
   while (true) {
+    wait_until(std::min({until_ns, logic_.deadline_ns(), look_again_ns_}));  // be it to look which are gone
     read_all();
     if (!meant_.empty()) {
       const ButtonEvent event = meant_.front();
@@ -213,7 +214,6 @@ std::optional<ButtonEvent> EvdevButton::poll(std::chrono::milliseconds at_most) 
     }
     hear_of_plugging();
     if (clock_ns(CLOCK_MONOTONIC) >= until_ns) return std::nullopt;
-    wait_until(std::min({until_ns, logic_.deadline_ns(), look_again_ns_}));
   }
 }
 

@@ -56,10 +56,10 @@ void read_camera(ConfigTable table, Scenario& s) {
   s.exposure_s = table.number("exposure_s", 1e-6, 1).value_or(s.exposure_s);
   s.packet_loss = table.number("packet_loss", 0, 0.5).value_or(s.packet_loss);
   s.clock_ppm = table.number("clock_ppm", -1000, 1000).value_or(s.clock_ppm);
-  const std::string format = table.text("pixel_format").value_or("BayerRG12");
-  const auto parsed = parse_pixel_format(format);
-  if (!parsed || !wire_format(format)) table.fail("pixel_format", format + " is none that a camera of ours sends");
-  s.sensor.format = *parsed;
+  s.pixel_format = table.text("pixel_format").value_or(s.pixel_format);
+  const std::optional<WireFormat> format = wire_format(s.pixel_format);
+  if (!format) table.fail("pixel_format", s.pixel_format + " is none that a camera of ours sends");
+  s.sensor.format = format->format;
   table.refuse_unknown_keys();
 }
 

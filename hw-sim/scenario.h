@@ -35,8 +35,9 @@ struct Fault {
 
 // One recording without hardware, on one timeline.
 struct Scenario {
-  int size_px = 512;  // edge of a frame
-  TakeOptions take;   // with the seed of everything
+  int size_px = 512;                       // edge of a frame
+  TakeOptions take;                        // with the seed of everything
+  std::string pixel_format = "BayerRG12";  // on the wire (device/pixel_packing.h)
   SensorTraits sensor;
   std::string address = "127.0.0.37";  // where the camera answers
   double frame_rate_hz = 37;

@@ -66,7 +66,7 @@ class DiskControl {
 GigeCameraOptions camera_options(const Scenario& s) {
   GigeCameraOptions o;
   o.address = s.address;
-  o.format = *wire_format(pixel_format_name(s.sensor.format));
+  o.format = *wire_format(s.pixel_format);
   o.width = o.height = s.size_px;
   o.frame_rate_hz = s.frame_rate_hz;
   o.exposure_s = s.exposure_s;
