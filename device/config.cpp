@@ -36,7 +36,7 @@ std::optional<LookoutOptions> read_detection_config(ConfigTable table) {
   LookoutOptions o;
   o.detection.duty = table.number("duty", 0.01, 1).value_or(o.detection.duty);
   o.detection.detector.quad_decimate = table.number("quad_decimate", 1, 8).value_or(o.detection.detector.quad_decimate);
-  if (const auto calibration = table.path("calibration")) o.camera = read_camera_model(*calibration);
+  if (const auto calibration = table.path("calibration")) o.seeing.camera = read_camera_model(*calibration);
   table.refuse_unknown_keys();
   return wanted ? std::optional(o) : std::nullopt;
 }
@@ -71,7 +71,7 @@ DeviceConfig read_device_config(const fs::path& file) {
   config.metering = read_metering_config(ConfigTable(root, "metering", file.string()), config.black_level_hint);
   config.lookout = read_detection_config(ConfigTable(root, "detection", file.string()));
   const std::optional<LightPlane> plane = read_plane_config(ConfigTable(root, "plane", file.string()));
-  if (config.lookout) config.lookout->plane = plane;
+  if (config.lookout) config.lookout->seeing.plane = plane;
   config.operating = read_operator_config(root, file.string());
   config.status = read_status_config(ConfigTable(root, "status", file.string()));
   return config;

@@ -34,7 +34,7 @@ struct GuidanceOptions {
   double patience_s = 5;     // > 0; a place not reached in this time is given up for another,
   double not_again_s = 30;   // ≥ 0; and its patch is left alone for so long
   double better = 1.8;       // > 1; another place must promise so many times more per second to be preferred
-  double hold_s = 0.15;       // ≥ 0; a sentence stays at least so long
+  double hold_s = 0.15;      // ≥ 0; a sentence stays at least so long
   double near_m = 0.035;     // ≥ 0; no move is asked for less
   double near_rad = 0.06;    // ≥ 0; no tilt
   double little_m = 0.07;    // less than this is "a little"

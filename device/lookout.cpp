@@ -31,27 +31,25 @@ CameraModel read_camera_model(const std::filesystem::path& calibration) {
   return camera;
 }
 
-Lookout::Lookout(const LookoutOptions& options, const MirrorTarget& target, const std::optional<WorldTarget>& world,
-                 const ResponseCurve& response, const PixelFormat& format, int width, int height)
-    : options_(options), target_(target), world_(world), camera_(options.camera) {
-  if (camera_ && (camera_->width != width || camera_->height != height))
-    throw InputError("detection", "calibration", "is of another picture size: calibrate with these settings");
-  if (!camera_) quick_camera_.emplace(target, width, height);
-  if (world_) world_pose_.emplace(*world_);
+DetectionOptions detection_options(const LookoutOptions& options, const MirrorTarget& target) {
   DetectionOptions detection = options.detection;
   detection.detector.family = target.family;
   for (const PlanarTag& tag : target.tags) detection.follow.ids.push_back(tag.id);
-  detection_ =
-      std::make_unique<Detection>(detection, response, format, [this](DetectedFrame frame) { look(std::move(frame)); });
+  return detection;
+}
+
+Lookout::Lookout(const LookoutOptions& options, const MirrorTarget& target, const std::optional<WorldTarget>& world,
+                 const ResponseCurve& response, const PixelFormat& format, int width, int height)
+    : target_(target), seer_(options.seeing, target, world, width, height) {
+  detection_ = std::make_unique<Detection>(detection_options(options, target), response, format,
+                                           [this](DetectedFrame frame) { look(std::move(frame)); });
 }
 
 Lookout::~Lookout() = default;
 
 void Lookout::begin_recording() {
   const std::lock_guard lock(mutex_);
-  coverage_.reset();
-  coverage_status_.reset();
-  guidance_ = Guidance();
+  seer_.forget_coverage();
   sights_.clear();
 }
 
@@ -68,39 +66,14 @@ std::optional<bool> Lookout::mirror_in_view() const {
 void Lookout::describe(RigStatus& status) const {
   const std::lock_guard lock(mutex_);
   status.preview = preview_;
-  status.coverage = coverage_status_;
-}
-
-std::optional<Rigid3> Lookout::pose_of(const DetectedFrame& frame) {
-  if (quick_camera_ && !camera_) {
-    quick_camera_->add(frame.tags);
-    camera_ = quick_camera_->camera();
-  }
-  if (!camera_) return std::nullopt;
-  if (world_pose_) world_pose_->add(frame.tags, *camera_);
-  const std::optional<OnlinePose> pose = online_mirror_pose(frame.tags, target_, *camera_);
-  return pose ? std::optional(pose->cam_from_target) : std::nullopt;
-}
-
-void Lookout::cover(const Rigid3& cam_from_mirror, const DetectedFrame& frame) {
-  if (!coverage_) {
-    if (!world_pose_ || !world_pose_->pose()) return;
-    CoverageOptions coverage = options_.coverage;
-    coverage.plane = options_.plane ? *options_.plane : plane_between(*world_);
-    coverage_.emplace(coverage, MirrorReach(*camera_, world_pose_->pose()->cam_from_target, target_));
-  }
-  coverage_->add(cam_from_mirror, frame.luminance, frame.reduction);
-  coverage_status_ = coverage_->status();
-  coverage_status_->advice =
-      guidance_.advise(*coverage_, cam_from_mirror, 1e-9 * static_cast<double>(frame.arrival.monotonic_ns));
+  status.coverage = seer_.coverage();
 }
 
 void Lookout::look(DetectedFrame frame) {
   RigPreview preview{preview_of(frame.luminance), static_cast<double>(frame.reduction), frame.tags, false};
   const std::lock_guard lock(mutex_);
-  const std::optional<Rigid3> pose = pose_of(frame);
+  const std::optional<Rigid3> pose = seer_.add(frame);
   preview.posed = pose.has_value();
-  if (pose) cover(*pose, frame);
   mirror_in_view_ = std::any_of(frame.tags.begin(), frame.tags.end(),
                                 [&](const TagDetection& tag) { return target_.find(tag.id) != nullptr; });
   preview_ = std::move(preview);

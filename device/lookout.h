@@ -8,21 +8,17 @@
 #include <vector>
 
 #include "common/mirror_target.h"
-#include "device/coverage.h"
 #include "device/detection.h"
-#include "device/guidance.h"
-#include "device/online_pose.h"
-#include "device/quick_camera.h"
 #include "device/rig_status.h"
+#include "device/sightseer.h"
 
 namespace mf {
 
 struct LookoutOptions {
-  DetectionOptions detection;         // follow.ids and the family come from the targets
-  std::optional<CameraModel> camera;  // of the rig's last calibration; nothing: a quick one, from the first frames
-  std::optional<LightPlane> plane;    // nothing: what the world's tags span
-  CoverageOptions coverage;
+  DetectionOptions detection;  // follow.ids and the family come from the target
+  Sightseer::Options seeing;
 };
+[[nodiscard]] DetectionOptions detection_options(const LookoutOptions&, const MirrorTarget&);
 
 // K and the distortion of a calibration.json. Throws InputError naming file and field.
 [[nodiscard]] CameraModel read_camera_model(const std::filesystem::path& calibration);
@@ -56,23 +52,13 @@ class Lookout {
 
  private:
   void look(DetectedFrame);
-  [[nodiscard]] std::optional<Rigid3> pose_of(const DetectedFrame&);
-  void cover(const Rigid3& cam_from_mirror, const DetectedFrame&);
 
-  LookoutOptions options_;
   MirrorTarget target_;
-  std::optional<WorldTarget> world_;
-
-  mutable std::mutex mutex_;  // guards what follows, up to detection_
-  std::optional<QuickCamera> quick_camera_;
-  std::optional<CameraModel> camera_;
-  std::optional<WorldPoseEstimate> world_pose_;
-  std::optional<Coverage> coverage_;
-  Guidance guidance_;
+  mutable std::mutex mutex_;  // guards what follows
+  Sightseer seer_;
   std::vector<Sight> sights_;
   std::optional<bool> mirror_in_view_;
   std::optional<RigPreview> preview_;
-  std::optional<CoverageStatus> coverage_status_;
 
   std::unique_ptr<Detection> detection_;  // last: its thread uses all of the above
 };

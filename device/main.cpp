@@ -11,6 +11,7 @@
 #include "device/config.h"
 #include "device/daemon.h"
 #include "device/machine_check.h"
+#include "device/replay.h"
 #include "device/rig_status_json.h"
 #include "device/v4l2_source.h"
 
@@ -27,6 +28,7 @@ struct Arguments {
   std::filesystem::path config = "/etc/mirrorfield/mirrorfieldd.toml";
   std::filesystem::path output;
   double seconds = 0;
+  std::filesystem::path replay;
   bool record = false;
   bool list = false;
   bool check = false;
@@ -56,6 +58,20 @@ void check(const Arguments& a) {
     bad = bad || f.level == mf::Finding::Level::error;
   }
   if (bad) throw mf::InputError("this machine", "", "cannot record: mend the errors above");
+}
+
+// What detection finds in a recording, with this rig's settings when there is a config.
+void replay_session(const Arguments& a) {
+  mf::LookoutOptions options;
+  if (std::filesystem::exists(a.config))
+    if (const auto configured = mf::read_device_config(a.config).lookout) options = *configured;
+  const mf::ReplayResult r = mf::replay(a.replay, options, [](const mf::ReplayedFrame& f) {
+    fmt::print("{:>8} {:3} tags {:6.1f} ms{}\n", f.frame->info.name, f.detected->tags.size(), f.detected->milliseconds,
+               f.posed ? "  posed" : "");
+  });
+  fmt::print("{}: {} of {} frames with tags ({:.0f} in the median one), {} posed, {:.1f} ms a frame{}\n",
+             a.replay.string(), r.with_tags, r.frames, r.median_tags, r.posed, r.median_ms,
+             r.covered ? fmt::format(", {:.0f} % of the light covered", 100 * *r.covered) : "");
 }
 
 void show(const mf::RigStatus& s) {
@@ -95,10 +111,12 @@ int main(int argc, char** argv) {
   program.option("-o,--output", arguments.output, "record at once, into this session, and end with it");
   program.flag("--record", arguments.record, "record at once, into a new session in the config's folder");
   program.option("--seconds", arguments.seconds, "stop a recording by itself after so long; 0: don't");
+  program.option("--replay", arguments.replay, "look for tags and poses in this session again, and record nothing");
   program.flag("--check", arguments.check, "say what is wrong with this machine, and change nothing");
   program.flag("--list", arguments.list, "show the cameras that answer, and record nothing");
   program.on_run([&] {
     if (arguments.list) return list_cameras();
+    if (!arguments.replay.empty()) return replay_session(arguments);
     arguments.check ? check(arguments) : run(arguments);
   });
   return program.run(argc, argv);

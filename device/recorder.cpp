@@ -85,6 +85,15 @@ void Recorder::note_tags(const FrameArrival& arrival, std::vector<TagDetection> 
   changed_.notify_all();
 }
 
+void Recorder::write_document(const std::string& key, const nlohmann::json& document) {
+  if (status().failure) return;
+  try {
+    writer_.write_document(key, document);
+  } catch (const std::exception& e) {
+    fail(e);
+  }
+}
+
 RecorderStatus Recorder::status() const {
   const std::lock_guard lock(mutex_);
   RecorderStatus status = status_;

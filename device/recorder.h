@@ -63,6 +63,9 @@ class Recorder {
   // Frames that will never come. `missing` 0: nobody can tell how many.
   void note_gap(std::int64_t missing, std::int64_t monotonic_ns, const std::string& reason);
 
+  // SessionWriter::write_document(); what fails there fails the recording. Not after finish().
+  void write_document(const std::string& key, const nlohmann::json&);
+
   [[nodiscard]] RecorderStatus status() const;
   // Writes what is queued, makes it durable and closes the session. The status tells of a failure.
   void finish();

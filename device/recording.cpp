@@ -56,8 +56,11 @@ void Recording::count(const FrameArrival& now) {
     if (missing > 0) recorder_->note_gap(missing, now.monotonic_ns, "the camera's numbers skip");
     if (now.device_frame == last_.device_frame)
       recorder_->note_gap(0, now.monotonic_ns, "the camera's number repeats: perhaps the frame, too");
-    if (now.device_ns != 0 && now.device_ns < last_.device_ns)
-      recorder_->note_gap(0, now.monotonic_ns, "the camera's clock jumped back");
+  }
+  if (now.device_ns != 0) {
+    const ClockEvent event = clock_.add(now.device_ns, now.monotonic_ns);
+    if (event == ClockEvent::jumped) recorder_->note_gap(0, now.monotonic_ns, "the camera's clock jumped");
+    if (event == ClockEvent::restarted) recorder_->note_gap(0, now.monotonic_ns, "the camera's clock began anew");
   }
   last_ = now;
 }
@@ -79,6 +82,12 @@ void Recording::take(Received received, FrameRole role) {
 
 RecorderStatus Recording::finish() {
   if (buffer_ != nullptr) recorder_->give_back(std::exchange(buffer_, nullptr));
+  if (const auto clock = clock_.clock())
+    recorder_->write_document("clock", {{"device_at_ns", clock->device_at_ns},
+                                        {"monotonic_at_ns", clock->host_at_ns},
+                                        {"host_per_device", clock->host_per_device},
+                                        {"lateness_ns", clock->lateness_ns},
+                                        {"events", clock_.events()}});
   recorder_->finish();
   return recorder_->status();
 }

@@ -5,12 +5,14 @@
 #include <optional>
 
 #include "device/camera_source.h"
+#include "device/clock_fit.h"
 #include "device/recorder.h"
 
 namespace mf {
 
 // One session while it is recorded: a recorder, and the count of what the camera's own numbers say is missing. Writes
-// the camera's description beside the frames (document "device").
+// the camera's description beside the frames (document "device"), and at the end the camera's clock in the host's time
+// (document "clock": ClockFit's line).
 class Recording {
  public:
   // Format and size of `header` are set from the camera. Throws InputError when the session cannot be made.
@@ -39,7 +41,8 @@ class Recording {
   std::optional<Recorder> recorder_;
   CameraFrame spare_;
   CameraFrame* buffer_ = nullptr;  // the recorder's, between next_buffer() and take()
-  FrameArrival last_;              // device_frame 0: none since the camera was opened
+  ClockFit clock_;
+  FrameArrival last_;  // device_frame 0: none since the camera was opened
 };
 
 // Frames between two of the camera's numbers. GigE Vision's 16-bit numbers go from 65535 to 1; 0 is no number.

@@ -88,7 +88,7 @@ class Rig {
   std::chrono::steady_clock::time_point began_;  // the recording, over all its sessions
   std::chrono::steady_clock::time_point told_;
   int continuations_ = 0;
-  RecorderStatus before_;  // sums over the sessions that this one continues
+  RecorderStatus before_;     // sums over the sessions that this one continues
   bool scene_comes_ = false;  // the next frame is the scene picture
   std::string alarm_;         // stays until the next start
   std::int64_t frames_ = 0;   // since the rate was taken last

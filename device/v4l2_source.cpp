@@ -70,11 +70,13 @@ class V4l2Source final : public CameraSource {
 
 V4l2Source::V4l2Source(const CameraSettings& settings) : device_(node_of(settings)), controls_(device_) {
   const FoundCamera identity = identify_v4l2_camera(device_);
+  description_.steady = hold_steady(controls_);
   picture_ = set_v4l2_picture(device_, settings);
   if (settings.frame_rate_hz) set_v4l2_frame_rate(device_, *settings.frame_rate_hz);
   if (settings.exposure_s) set_v4l2_exposure(controls_, device_.node(), *settings.exposure_s, picture_.width);
   if (settings.gain_db) set_v4l2_gain(controls_, device_.node(), *settings.gain_db, settings.gain_step_db);
   describe(identity, settings);
+  description_.response = apply_response(controls_, settings.response, description_.exposure_s);
   stream_.emplace(device_);
 }
 
