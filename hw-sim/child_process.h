@@ -21,6 +21,7 @@ class ChildProcess {
   ~ChildProcess();
 
   void signal(int number) const;
+  [[nodiscard]] pid_t process() const { return process_; }
   // Its exit code, 128 + the signal that ended it; nothing when it still runs after `at_most`.
   [[nodiscard]] std::optional<int> wait(std::chrono::milliseconds at_most);
 

@@ -7,8 +7,8 @@
 
 namespace mf::sim {
 
-Player::Player(const Take& take, const SensorTraits& traits, std::uint64_t seed)
-    : take_(&take), traits_(traits), seed_(seed) {}
+Player::Player(const Take& take, const SensorTraits& traits, std::uint64_t seed, Ending ending)
+    : take_(&take), traits_(traits), seed_(seed), ending_(ending) {}
 
 void Player::expose(const GigeShot& shot, std::span<std::uint8_t> into) {
   if (!sensor_ || response_ != shot.response || gain_db_ != shot.gain_db) {

@@ -28,19 +28,21 @@ struct PlayedFrame {
 // auto into) { player.expose(s, into); }`.
 class Player {
  public:
+  enum class Ending { still_scene, again };  // what comes after the last frame of the mirror
   // The take outlives it.
-  Player(const Take&, const SensorTraits&, std::uint64_t seed);
+  Player(const Take&, const SensorTraits&, std::uint64_t seed, Ending = Ending::still_scene);
 
   void expose(const GigeShot&, std::span<std::uint8_t> into);
   void put_mirror_aside() { waiting_frame_ = Take::without_mirror; }
   void begin() { begun_ = true; }
-  [[nodiscard]] bool ended() const { return next_ >= take_->frames(); }
+  [[nodiscard]] bool ended() const { return ending_ == Ending::still_scene && next_ >= take_->frames(); }
   [[nodiscard]] std::vector<PlayedFrame> played() const;
 
  private:
   const Take* take_;
   SensorTraits traits_;
   std::uint64_t seed_;
+  Ending ending_;
   std::atomic<bool> begun_ = false;
   std::atomic<int> waiting_frame_ = Take::lamp_shown;
   std::atomic<int> next_ = 0;

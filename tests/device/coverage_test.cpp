@@ -12,7 +12,7 @@
 #include "common/error.h"
 #include "common/virtual_view.h"
 #include "device/guidance.h"
-#include "hw-sim/capture.h"
+#include "hw-sim/desk_rig.h"
 #include "hw-sim/motion.h"
 #include "hw-sim/scene.h"
 #include "tests/device/waving_hand.h"

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "device/quick_camera.h"
-#include "hw-sim/capture.h"
+#include "hw-sim/desk_rig.h"
 #include "hw-sim/motion.h"
 #include "hw-sim/scene.h"
 #include "tests/device/seen_tags.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "hw-sim/capture.h"
+#include "hw-sim/desk_rig.h"
 #include "hw-sim/scene.h"
 
 namespace mf::test {

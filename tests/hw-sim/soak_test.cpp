@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// The daemon over minutes, as it runs on location: 1024 × 1024 pixels of 12 bits, 37 frames a second, one packet in a
+// thousand lost, detection on. A minute here; ten in the long variant. Processor time is told, not judged: the machine
+// is shared. docs/benchmarks.md has it.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include "common/session.h"
+#include "hw-sim/child_process.h"
+#include "hw-sim/player.h"
+#include "hw-sim/status_listener.h"
+#include "hw-sim/truth_files.h"
+#include "tests/support/full_counts.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mf::sim {
+namespace {
+
+namespace fs = std::filesystem;
+using SoakClock = std::chrono::steady_clock;
+
+constexpr int size_px = 1024;
+constexpr double rate_hz = 37;
+
+GigeCameraOptions camera_options() {
+  GigeCameraOptions o;
+  o.address = "127.0.7.1";
+  o.format = *wire_format("BayerRG12");
+  o.width = o.height = size_px;
+  o.frame_rate_hz = rate_hz;
+  o.packet_loss = 0.001;
+  o.clock_ppm = 50;
+  return o;
+}
+
+void write_config(const fs::path& folder) {
+  std::ofstream(folder / "rig.toml") << "[camera]\naddress = '127.0.7.1'\npacket_bytes = 8000\n[mirror]\n"
+                                        "target = 'target.json'\nworld = 'world.json'\n[recording]\nfolder = '.'\n"
+                                        "black_level_hint = 64\n[detection]\nduty = 0.15\n"
+                                        "[status]\nsocket = 'status.sock'\n";
+}
+
+double resident_mb(const fs::path& proc) {
+  std::ifstream status(proc / "status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmRSS:")) return std::stod(line.substr(6)) / 1024;
+  return 0;
+}
+
+double child_cpu_s() {
+  rusage used{};
+  getrusage(RUSAGE_CHILDREN, &used);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  return seconds(used.ru_utime) + seconds(used.ru_stime);
+}
+
+TEST(Soak, NothingIsLostAndNothingGrows) {
+  const double seconds = test::repetitions(60, 600);
+  const test::TemporaryFolder folder;
+  const DeskRig rig(size_px, 1);
+  TakeOptions options;
+  options.frames = 24;
+  options.samples = options.scene_samples = 1;
+  SensorTraits sensor;
+  sensor.full_exposure = 0.015;
+  const Take take(rig, options, sensor, {});
+  write_target(folder.path(), rig.plate.target());
+  write_world(folder.path(), rig.scene.world);
+  write_config(folder.path());
+  Player player(take, sensor, 1, Player::Ending::again);
+  player.begin();
+  const GigeCamera camera(camera_options(),
+                          [&](const GigeShot& s, std::span<std::uint8_t> into) { player.expose(s, into); });
+
+  const SoakClock::time_point start = SoakClock::now();
+  const auto elapsed = [&] { return std::chrono::duration<double>(SoakClock::now() - start).count(); };
+  ChildProcess daemon({MF_BINARY_DIR "/mirrorfieldd", "--config", folder / "rig.toml", "-o", folder / "s"}, {});
+  StatusListener listener(folder / "status.sock");
+  int most_queued = 0;
+  double memory_mb = 0, most_memory_mb = 0;
+  while (elapsed() < seconds) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    ASSERT_FALSE(daemon.wait(std::chrono::milliseconds(0)).has_value()) << "the daemon ended";
+    most_queued = std::max(most_queued, listener.latest().queued);
+    const double now_mb = resident_mb(fs::path("/proc") / std::to_string(daemon.process()));
+    if (elapsed() > 15 && memory_mb == 0) memory_mb = now_mb;  // everything is allocated by then
+    most_memory_mb = std::max(most_memory_mb, now_mb);
+  }
+  daemon.signal(SIGTERM);
+  ASSERT_EQ(daemon.wait(std::chrono::seconds(30)), 0);
+
+  const SessionReader session(folder / "s");
+  for (const FrameGap& gap : session.gaps()) ADD_FAILURE() << gap.missing << " frames: " << gap.reason;
+  const std::vector<SessionFrame>& frames = session.frames();
+  EXPECT_GT(static_cast<double>(frames.size()), 0.8 * rate_hz * (seconds - 10));
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    ASSERT_EQ(frames[i].arrival->device_frame, frames[i - 1].arrival->device_frame % 65535 + 1);
+  EXPECT_LE(most_queued, 12) << "a quarter of the queue";
+  EXPECT_LT(most_memory_mb, memory_mb + 8);
+  const double cpu = child_cpu_s();
+  std::printf(
+      "%zu frames, queue at most %d of 48, %.0f MB then at most %.0f MB, %.0f %% of one core, tags in %zu frames\n",
+      frames.size(), most_queued, memory_mb, most_memory_mb, 100 * cpu / seconds, session.tags().size());
+}
+
+}  // namespace
+}  // namespace mf::sim
