@@ -39,8 +39,9 @@ bool contains(const Names& names, std::string_view name) {
 
 // The C++ standard library has no dots in its names; of POSIX and Linux, these folders and these files.
 bool is_system_header(std::string_view header) {
-  static const Names posix{"sys/",      "netinet/", "arpa/",    "net/",     "unistd.h",  "fcntl.h",  "poll.h",
-                           "pthread.h", "netdb.h",  "signal.h", "dirent.h", "termios.h", "endian.h", "ifaddrs.h", "grp.h"};
+  static const Names posix{"sys/",     "netinet/",  "arpa/",     "net/",      "unistd.h",
+                           "fcntl.h",  "poll.h",    "pthread.h", "netdb.h",   "signal.h",
+                           "dirent.h", "termios.h", "endian.h",  "ifaddrs.h", "grp.h"};
   return header.find('.') == std::string_view::npos || starts_with_any(header, posix);
 }
 
@@ -120,7 +121,9 @@ const std::vector<FolderRule>& include_table() {
        {"common/", "device/rig_status", "device/status_socket.h", "device/status_config.h", "device/owned_fd.h"},
        vocabulary + Names{"microhttpd"}},
       // The simulator writes the import format: frames as PNG, truth as EXR, tags as AprilTag draws them.
-      {"hw-sim/", {"common/", "device/"}, vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev", "usbfs"}},
+      {"hw-sim/",
+       {"common/", "device/"},
+       vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev", "usbfs"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
@@ -136,9 +139,9 @@ const std::vector<FolderRule>& include_table() {
       {"host/cli/", {"common/", "host/"}, stage_libraries},
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},
-       stage_libraries + Names{"GoogleTest", "benchmark", "OpenCV", "Ceres", "SQLite", "TIFF", "PNG", "OpenEXR",
-                               "Imath", "AprilTag", "Embree", "assimp", "GL", "Aravis", "umockdev", "V4L2",
-                               "libevdev", "libusb", "libudev", "systemd", "microhttpd"}},
+       stage_libraries + Names{"GoogleTest", "benchmark", "OpenCV",   "Ceres",  "SQLite",  "TIFF",    "PNG",
+                               "OpenEXR",    "Imath",     "AprilTag", "Embree", "assimp",  "GL",      "Aravis",
+                               "umockdev",   "V4L2",      "libevdev", "libusb", "libudev", "systemd", "microhttpd"}},
   };
   return table;
 }
