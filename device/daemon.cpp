@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <utility>
 #include <vector>
 
 #include "common/error.h"
@@ -15,6 +16,7 @@
 #include "device/rig_status_json.h"
 #include "device/service_notice.h"
 #include "device/status_socket.h"
+#include "device/usb_reset.h"
 #include "device/v4l2_source.h"
 
 namespace mf {
@@ -95,6 +97,42 @@ class Watchdog {
   DaemonClock::time_point last_{};
 };
 
+// Opens the camera again and again while it is away. A USB camera that was there and does not answer for a while hangs:
+// its port is reset.
+class CameraOpener {
+ public:
+  explicit CameraOpener(CameraSettings settings) : settings_(std::move(settings)) {}
+
+  std::unique_ptr<CameraSource> operator()() {
+    try {
+      std::unique_ptr<CameraSource> camera = open_camera(settings_);
+      serial_ = camera->description().serial;
+      failing_since_.reset();
+      return camera;
+    } catch (const InputError&) {
+      reset_if_it_hangs();
+      throw;
+    }
+  }
+
+ private:
+  void reset_if_it_hangs() {
+    constexpr std::chrono::seconds patience{3};
+    const bool network = settings_.address.find_first_not_of("0123456789.") == std::string::npos;
+    if (serial_.empty() || (network && !settings_.address.empty())) return;
+    const DaemonClock::time_point now = DaemonClock::now();
+    if (!failing_since_) failing_since_ = now;
+    if (now - *failing_since_ < patience) return;
+    failing_since_ = now;
+    // Whatever came of it, the next opening shows: an absent device is not on the bus, and nothing is reset.
+    (void)reset_usb_device({0, 0, serial_});
+  }
+
+  CameraSettings settings_;
+  std::string serial_;  // of the camera that was there
+  std::optional<DaemonClock::time_point> failing_since_;
+};
+
 void require_a_start(const DeviceConfig& config, const DaemonOptions& options) {
   const OperatorConfig& o = config.operating;
   if (options.record_now || o.button || o.hid_button || config.status.remote_start) return;
@@ -133,7 +171,7 @@ RigStatus run_daemon(const DeviceConfig& config, const DaemonOptions& options, c
                               status.problem.empty() ? "" : ", ", status.problem));
     if (show) show(status);
   };
-  Rig rig([&] { return open_camera(config.camera); }, rig_options(config, options), links);
+  Rig rig([opener = CameraOpener(config.camera)]() mutable { return opener(); }, rig_options(config, options), links);
   running = &rig;
   notice_ready();
   Watchdog watchdog;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hw-sim/child_process.h"
 
-#include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <thread>
@@ -37,10 +38,15 @@ std::vector<char*> pointers(std::vector<std::string>& texts) {
 ChildProcess::ChildProcess(const std::vector<std::string>& command,
                            const std::map<std::string, std::string>& environment) {
   std::vector<std::string> words = command, variables = joined_environment(environment);
-  const int error =
-      ::posix_spawn(&process_, words[0].c_str(), nullptr, nullptr, pointers(words).data(), pointers(variables).data());
-  if (error != 0)
-    throw InputError(command[0], "", std::string("cannot be started (") + std::strerror(error) + "): build it first");
+  const std::vector<char*> arguments = pointers(words), settings = pointers(variables);
+  if (::access(words[0].c_str(), X_OK) != 0)
+    throw InputError(command[0], "", std::string("cannot be started (") + std::strerror(errno) + "): build it first");
+  process_ = ::fork();
+  if (process_ < 0) throw InputError(command[0], "", std::string("cannot be started (") + std::strerror(errno) + ")");
+  if (process_ > 0) return;
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // whatever becomes of us, it does not outlive us
+  ::execve(words[0].c_str(), arguments.data(), settings.data());
+  ::_exit(127);
 }
 
 ChildProcess::~ChildProcess() {

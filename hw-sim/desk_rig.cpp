@@ -53,8 +53,9 @@ Region around_plate(const CameraModel& camera, const Rigid3& cam_from_mirror, co
           even(high.x() + spare_px, camera.width), even(high.y() + spare_px, camera.height)};
 }
 
-DeskRig::DeskRig(int size, std::uint64_t seed)
+DeskRig::DeskRig(int size, std::uint64_t seed, std::shared_ptr<const EnvironmentMap> panorama)
     : scene(desk_scene(stream_key(seed, Stream::scene))), camera(desk_camera(size)) {
+  scene.panorama = std::move(panorama);
   motion = {cam_from_world.inverse().translation, scene.lamp.centre_in_world.cast<double>(), plate.half_size_m()};
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "common/camera_model.h"
@@ -38,7 +39,8 @@ struct DeskRig {
   Rigid3 cam_from_world = desk_cam_from_world(0);
   MotionInput motion;
 
-  DeskRig(int size, std::uint64_t seed);
+  // `panorama`: the distant surroundings; null: a hall with windows.
+  DeskRig(int size, std::uint64_t seed, std::shared_ptr<const EnvironmentMap> panorama = nullptr);
   DeskRig(const DeskRig&) = delete;
   DeskRig& operator=(const DeskRig&) = delete;
 

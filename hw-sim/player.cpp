@@ -18,7 +18,7 @@ void Player::expose(const GigeShot& shot, std::span<std::uint8_t> into) {
   }
   const bool waving = begun_ && !ended();
   const PlayedFrame now{shot.number,
-                        waving    ? next_.load()
+                        waving    ? next_ % take_->frames()
                         : ended() ? Take::without_mirror
                                   : waiting_frame_.load(),
                         clock_ns(CLOCK_MONOTONIC), shot.exposure_s};

@@ -43,6 +43,7 @@ void read_take(ConfigTable table, Scenario& s) {
   s.take.scene_samples = table.integer("scene_samples", 1, 100000).value_or(s.take.scene_samples);
   s.take.blur = table.number("blur", 0, 1).value_or(s.take.blur);
   s.take.seed = static_cast<std::uint64_t>(table.integer("seed", 0, 1 << 30).value_or(1));
+  s.panorama = table.path("panorama").value_or("");
   s.lead_s = table.number("lead_s", 0.5, 60).value_or(s.lead_s);
   s.tail_s = table.number("tail_s", 0, 60).value_or(s.tail_s);
   table.refuse_unknown_keys();

@@ -37,6 +37,7 @@ struct Fault {
 struct Scenario {
   int size_px = 512;                       // edge of a frame
   TakeOptions take;                        // with the seed of everything
+  std::filesystem::path panorama;          // OpenEXR, the distant surroundings; empty: a hall with windows
   std::string pixel_format = "BayerRG12";  // on the wire (device/pixel_packing.h)
   SensorTraits sensor;
   std::string address = "127.0.0.37";  // where the camera answers

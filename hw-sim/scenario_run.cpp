@@ -269,12 +269,14 @@ void write_played(const fs::path& truth, const std::vector<PlayedFrame>& played)
 
 ScenarioResult run_scenario(const Scenario& scenario, const ScenarioFiles& files, const Progress& progress,
                             const std::function<void(const std::string&)>& say) {
+  std::shared_ptr<const EnvironmentMap> panorama;
+  if (!scenario.panorama.empty()) panorama = std::make_shared<EnvironmentMap>(read_environment_map(scenario.panorama));
   std::error_code error;
   if (!fs::create_directory(files.folder, error))
     throw InputError(files.folder.string(), "",
                      error ? error.message() : "exists already: give a new folder or remove it");
   const fs::path folder = fs::absolute(files.folder);
-  const DeskRig rig(scenario.size_px, scenario.take.seed);
+  const DeskRig rig(scenario.size_px, scenario.take.seed, panorama);
   const Take take(rig, scenario.take, scenario.sensor, progress);
   write_target(folder, rig.plate.target());
   write_world(folder, rig.scene.world);

@@ -4,10 +4,12 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <variant>
 #include <vector>
 
 #include "common/mirror_target.h"
+#include "hw-sim/environment_map.h"
 #include "hw-sim/printed_tags.h"
 
 namespace mf::sim {
@@ -62,6 +64,8 @@ struct Scene {
   WorldTarget world;
   std::vector<Surface> surfaces;
   Lamp lamp;
+  std::shared_ptr<const EnvironmentMap>
+      panorama;  // what is distant; null: surroundings(). Scenes are copied, it is not
 };
 
 // A desk: table with checkerboard and four tags about the world origin, a lamp one metre away behind leaves, two walls.

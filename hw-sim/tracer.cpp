@@ -145,6 +145,16 @@ struct Tracer::Impl {
     if (cosine <= 0 || is_occluded({s.x, direction}, distance - scene.lamp.radius_m, mirror)) return Rgb::Zero();
     return s.albedo / pi * scene.lamp.radiance * (cosine * 2 * pi * one_minus_cos_max);
   }
+
+  // Likewise from the panorama, whose bright spots a diffuse reflection would hardly ever find.
+  [[nodiscard]] Rgb panorama_light(const SurfaceHit& s, const std::optional<MirrorPlate::Placement>& mirror,
+                                   const Eigen::Vector2f& u) const {
+    const EnvironmentMap::Drawn drawn = scene.panorama->draw(u);
+    const float cosine = s.normal.dot(drawn.direction);
+    constexpr float beyond_all = 1e6F;
+    if (cosine <= 0 || is_occluded({s.x, drawn.direction}, beyond_all, mirror)) return Rgb::Zero();
+    return s.albedo / pi * drawn.radiance * (cosine / drawn.density);
+  }
 };
 
 Tracer::Tracer(const Scene& scene, const MirrorPlate* plate)
@@ -184,12 +194,17 @@ Rgb Tracer::radiance(const Ray& camera_ray, const std::optional<MirrorPlate::Pla
       break;
     }
     if (!plate_hit && hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
-      sum += throughput * surroundings(ray.direction);
+      // A panorama was drawn from at the surface before, as the lamp was.
+      if (const EnvironmentMap* panorama = impl_->scene.panorama.get())
+        sum += lamp_counts ? Rgb(throughput * panorama->radiance(ray.direction)) : Rgb(Rgb::Zero());
+      else
+        sum += throughput * surroundings(ray.direction);
       break;
     }
     const Impl::SurfaceHit s =
         plate_hit ? impl_->plate_surface(ray, *mirror, *plate_hit) : impl_->surface_hit(ray, hit);
     sum += throughput * impl_->lamp_light(s, mirror, sampler.next_2d());
+    if (impl_->scene.panorama) sum += throughput * impl_->panorama_light(s, mirror, sampler.next_2d());
     throughput *= s.albedo;
     ray = {s.x, cosine_direction(s.normal, sampler.next_2d())};
     lamp_counts = false;
