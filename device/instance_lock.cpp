@@ -28,7 +28,7 @@ long holder_of(int file) {
 
 InstanceLock::InstanceLock(const std::filesystem::path& recordings) {
   const std::filesystem::path name = recordings / lock_name;
-  file_ = OwnedFile(::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
+  file_ = OwnedFd(::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644));
   if (file_.get() < 0)
     throw InputError(
         recordings.string(), "",
@@ -45,7 +45,7 @@ InstanceLock::InstanceLock(const std::filesystem::path& recordings) {
 }
 
 std::optional<long> instance_lock_holder(const std::filesystem::path& recordings) {
-  const OwnedFile file(::open((recordings / lock_name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+  const OwnedFd file(::open((recordings / lock_name).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
   if (file.get() < 0 || ::flock(file.get(), LOCK_SH | LOCK_NB) == 0 || errno != EWOULDBLOCK) return std::nullopt;
   return holder_of(file.get());
 }

@@ -4,7 +4,8 @@
 #include <filesystem>
 #include <optional>
 
-#include "device/c_handle.h"
+#include "device/owned_fd.h"
+#include "device/owned_fd.h"
 
 namespace mf {
 
@@ -16,7 +17,7 @@ class InstanceLock {
   explicit InstanceLock(const std::filesystem::path& recordings);
 
  private:
-  OwnedFile file_;
+  OwnedFd file_;
 };
 
 // The process that holds the lock; 0 when it did not say. None: nobody does. Changes nothing.

@@ -11,6 +11,7 @@
 
 #include "common/error.h"
 #include "device/c_handle.h"
+#include "device/owned_fd.h"
 
 namespace mf {
 
@@ -22,7 +23,7 @@ using LampClock = std::chrono::steady_clock;
 
 // Files of /sys are written as a whole by one write(). Returns 0 or the errno.
 int write_attribute(const std::filesystem::path& file, const std::string& value) {
-  const OwnedFile open(::open(file.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+  const OwnedFd open(::open(file.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (open.get() < 0) return errno;
   return ::write(open.get(), value.data(), value.size()) == static_cast<ssize_t>(value.size()) ? 0 : errno;
 }

@@ -22,6 +22,7 @@
 #include "device/clock.h"
 #include "device/config.h"
 #include "device/instance_lock.h"
+#include "device/owned_fd.h"
 
 namespace mf {
 
@@ -193,7 +194,7 @@ Finding free_space(const MachineCheckOptions& o) {
 // Eight times what a quarter of a second records, made durable: how long the slowest took.
 Finding durable_speed(const MachineCheckOptions& o) {
   constexpr int times = 8;
-  const OwnedFile file(::open(o.recordings.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
+  const OwnedFd file(::open(o.recordings.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600));
   if (file.get() < 0 && errno != EOPNOTSUPP)
     return failing(fmt::format("{} may not be written: {}", o.recordings.string(), std::strerror(errno)),
                    "give it to the daemon's user: chown -R mirrorfield");

@@ -15,6 +15,7 @@
 
 #include "common/error.h"
 #include "device/clock.h"
+#include "device/owned_fd.h"
 #include "device/udev_handle.h"
 
 namespace mf {
@@ -28,7 +29,7 @@ constexpr std::int64_t retry_ns = 1'000'000'000;  // a device that could not be 
 // One input device, open and grabbed.
 struct InputDevice {
   std::string node;
-  OwnedFile file;  // outlives evdev, which lets go of its grab through it
+  OwnedFd file;  // outlives evdev, which lets go of its grab through it
   Evdev evdev;
   std::set<unsigned> down;  // keys
   bool hung_up = false;     // poll says so: it is gone, whatever reading says
@@ -50,7 +51,7 @@ std::string why_not(const std::string& node, const char* what, int error, const 
 }
 
 Opened open_input(const std::string& node, std::optional<unsigned> key) {
-  OwnedFile file(::open(node.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  OwnedFd file(::open(node.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   if (file.get() < 0 && (errno == ENOENT || errno == ENODEV || errno == ENXIO)) return {};  // unplugged by now
   if (file.get() < 0) return {{}, why_not(node, "opened", errno, "see udev/60-mirrorfield.rules")};
   libevdev* raw = nullptr;

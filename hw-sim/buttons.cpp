@@ -19,6 +19,7 @@
 
 #include "common/error.h"
 #include "device/clock.h"
+#include "device/owned_fd.h"
 #include "hw-sim/mock_device.h"
 
 namespace mf::sim {
@@ -56,7 +57,7 @@ struct SimulatedButton::Impl {
   SimulatedButtonOptions options;
   MockDevice device;
   MockHandler handler;
-  OwnedFile line;  // a pseudo terminal: what is written here can be read, and waited for, at the node
+  OwnedFd line;  // a pseudo terminal: what is written here can be read, and waited for, at the node
   std::atomic<bool> pressed = false, grabbed = false, plugged = false;
   std::mt19937 random{1};
 };
@@ -125,7 +126,7 @@ void SimulatedButton::Impl::send(bool down) {
 
 // Not umockdev's own pseudo terminal: that stays open when the device is removed, and nobody would notice.
 void SimulatedButton::Impl::make_line() {
-  line = OwnedFile(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
+  line = OwnedFd(::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC));
   std::array<char, 64> name{};
   termios mode{};
   const bool made = line.get() >= 0 && ::grantpt(line.get()) == 0 && ::unlockpt(line.get()) == 0 &&
@@ -170,7 +171,7 @@ void SimulatedButton::unplug() {
   if (!impl_->plugged) return;
   impl_->plugged = false;
   remove_mock_device(impl_->testbed, impl_->device);
-  impl_->line = OwnedFile();  // whoever reads is told at once
+  impl_->line = OwnedFd();  // whoever reads is told at once
 }
 
 void SimulatedButton::contact(bool pressed, int bounces) {

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "device/owned_fd.h"
 #include "hw-sim/mock_device.h"
 
 namespace mf::sim {
@@ -70,7 +71,7 @@ class ReadySign {
   void make(const fs::path& node) {
     fs::remove(node);
     if (::mkfifo(node.c_str(), 0600) != 0) throw InputError(node.string(), "", "no pipe can be made there");
-    pipe_ = OwnedFile(::open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+    pipe_ = OwnedFd(::open(node.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
     if (pipe_.get() < 0 || ::fcntl(pipe_.get(), F_SETPIPE_SZ, page.size()) < 0)
       throw InputError(node.string(), "", "the pipe there cannot be used");
     show(false);
@@ -82,7 +83,7 @@ class ReadySign {
 
  private:
   std::array<char, 4096> page{};
-  OwnedFile pipe_;
+  OwnedFd pipe_;
 };
 
 bool is_request(const Bytes& setup, std::uint8_t type, std::uint8_t request) {

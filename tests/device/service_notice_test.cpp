@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "device/c_handle.h"
+#include "device/owned_fd.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mf {
@@ -37,7 +38,7 @@ class ServiceNotice : public testing::Test {
     return got < 0 ? "" : std::string(text.data(), static_cast<std::size_t>(got));
   }
   test::TemporaryFolder folder_;
-  OwnedFile socket_;
+  OwnedFd socket_;
 };
 
 TEST_F(ServiceNotice, EachIsOneMessage) {
