@@ -33,7 +33,7 @@ ExposureControl exposure_control(const V4l2Controls& controls, const std::string
 
 std::optional<std::string> gain_control(const V4l2Controls& controls) {
   for (const std::uint32_t id : {V4L2_CID_ANALOGUE_GAIN, V4L2_CID_GAIN})
-    if (const auto name = controls.name_of(id)) return name;
+    if (auto name = controls.name_of(id)) return name;
   return std::nullopt;
 }
 

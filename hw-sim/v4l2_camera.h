@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-struct _UMockdevTestbed;
+struct _UMockdevTestbed;  // NOLINT(bugprone-reserved-identifier): umockdev's own name of UMockdevTestbed
 
 namespace mf::sim {
 

@@ -26,7 +26,7 @@ T& as(void* argument) {
 }
 
 void put_text(__u8* target, std::size_t size, const std::string& text) {
-  std::memcpy(target, text.data(), std::min(size - 1, text.size()));
+  std::copy_n(text.begin(), std::min(size - 1, text.size()), target);  // zeros follow: the structs were cleared
 }
 
 timeval stamp_now(bool monotonic) {

@@ -190,7 +190,7 @@ TEST_F(V4l2Source, RefusedSettingsNameTheCameraTheFieldAndTheRemedy) {
   const auto with = [](auto&& change) {
     CameraSettings settings = test::settings_for_rig();
     change(settings);
-    const std::string error = refusal(settings);
+    std::string error = refusal(settings);
     EXPECT_TRUE(contains(error, "/dev/video60: "));
     return error;
   };

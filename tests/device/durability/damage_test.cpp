@@ -161,7 +161,7 @@ TEST_P(Damage, CutShort) {
 
 TEST_P(Damage, BitsFlipped) {
   std::mt19937 random(2);
-  damage(test::repetitions(12, 2000), [&](std::string bytes) {
+  damage(test::repetitions(12, 500), [&](std::string bytes) {
     const std::size_t at = std::uniform_int_distribution<std::size_t>(0, bytes.size() - 1)(random);
     bytes[at] = static_cast<char>(bytes[at] ^ 1 << std::uniform_int_distribution<int>(0, 7)(random));
     return bytes;
