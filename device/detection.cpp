@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "device/detection.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
 #include "common/error.h"
 #include "device/clock.h"
+#include "device/edge_alignment.h"
 
 namespace mf {
 
@@ -33,10 +35,49 @@ FrameDetector::FrameDetector(const DetectionOptions& options, const ResponseCurv
       detector_(options.detector),
       follower_(options.follow) {}
 
+namespace {
+
+// The tag and what the alignment looks at beside it.
+std::optional<PixelBox> box_around(const TagDetection& tag, const ImageU16& codes) {
+  constexpr double beside_px = 6;
+  Eigen::Vector2d low = tag.corners_px[0], high = tag.corners_px[0];
+  for (const Eigen::Vector2d& corner : tag.corners_px) low = low.cwiseMin(corner), high = high.cwiseMax(corner);
+  const int x0 = std::max(0, static_cast<int>(low.x() - beside_px)),
+            y0 = std::max(0, static_cast<int>(low.y() - beside_px));
+  const int x1 = std::min(codes.width, static_cast<int>(high.x() + beside_px) + 1);
+  const int y1 = std::min(codes.height, static_cast<int>(high.y() + beside_px) + 1);
+  return x1 > x0 && y1 > y0 ? std::optional(PixelBox{x0, y0, x1 - x0, y1 - y0}) : std::nullopt;
+}
+
+double shortest_edge_px(const TagDetection& tag) {
+  double shortest = 1e9;
+  for (std::size_t k = 0; k < 4; ++k)
+    shortest = std::min(shortest, (tag.corners_px[k] - tag.corners_px[(k + 1) % 4]).norm());
+  return shortest;
+}
+
+}  // namespace
+
+// False: the edges cannot be seen, so that the corners would be AprilTag's, half a pixel off.
+bool FrameDetector::align(const ImageU16& codes, TagDetection& tag) const {
+  const std::optional<PixelBox> box = box_around(tag, codes);
+  if (!box) return false;
+  constexpr double cells = 8, share = 0.6;  // the dark border of a tag is one of so many cells wide
+  const double reach_px = std::clamp(share * shortest_edge_px(tag) / cells, 1.0, 3.0);
+  const Eigen::Vector2d origin(box->x, box->y);
+  QuadCorners corners = tag.corners_px;
+  for (Eigen::Vector2d& corner : corners) corner -= origin;
+  const std::optional<QuadCorners> aligned = align_edges(levels_.linear(codes, *box), corners, reach_px);
+  if (!aligned) return false;
+  for (std::size_t k = 0; k < 4; ++k) tag.corners_px[k] = (*aligned)[k] + origin;
+  return true;
+}
+
 std::vector<TagDetection> FrameDetector::tags_in(const ImageU16& codes, const PixelBox& box) {
   std::vector<TagDetection> tags = detector_.detect(levels_.levels(codes, box));
   for (TagDetection& tag : tags)
     for (Eigen::Vector2d& corner : tag.corners_px) corner += Eigen::Vector2d(box.x, box.y);
+  std::erase_if(tags, [&](TagDetection& tag) { return !align(codes, tag); });
   return tags;
 }
 

@@ -41,8 +41,8 @@ struct DetectedFrame {
   int reduction = 1;               // frame pixels per pixel of `luminance`
 };
 
-// Tags of one frame: levels, search near the last place or everywhere, luminance. Not thread-safe. Throws InputError
-// for options that are wrong.
+// Tags of one frame: levels, search near the last place or everywhere, corners aligned on linear light, luminance. Not
+// thread-safe. Throws InputError for options that are wrong.
 class FrameDetector {
  public:
   FrameDetector(const DetectionOptions&, const ResponseCurve&, const PixelFormat&);
@@ -50,6 +50,7 @@ class FrameDetector {
 
  private:
   [[nodiscard]] std::vector<TagDetection> tags_in(const ImageU16& codes, const PixelBox&);
+  [[nodiscard]] bool align(const ImageU16& codes, TagDetection&) const;
 
   DetectionOptions options_;
   FrameLevels levels_;

@@ -19,19 +19,24 @@ bool is_bayer(PixelLayout layout) {
   return layout != PixelLayout::mono && layout != PixelLayout::rgb;
 }
 
-// What nine tenths of the lit pixels don't exceed, and what none does.
+// Where levels stop to be proportional to light, and the brightest there is.
 struct Brightness {
-  float bright = 0;
+  float knee = 0;
   float top = 0;
 };
 
-// From every fourth pixel of every fourth row, by 2 × 2 cells' greens: a percentile needs no more.
-Brightness brightness_of(const ImageU16& codes, const PixelBox& box, const std::vector<float>& exposure, int shift) {
+// Of one colour, from one pixel in sixteen: a percentile needs no more. The paper of the tags is the
+// brightest of surfaces, brighter than nine tenths of a picture, and should not lie on the shoulder; but a lamp that
+// fills a hundredth must not squash it either.
+Brightness brightness_of(const ImageU16& codes, const PixelBox& box, const std::vector<float>& exposure, int first_x,
+                         int first_y) {
+  constexpr double surfaces = 0.9, brightest = 0.99;
+  constexpr float paper_over_surfaces = 2;
   std::vector<std::uint32_t> histogram(exposure.size());
   std::uint32_t lit = 0;
   std::size_t top = 0;
-  for (int y = box.y; y < box.y + box.height; y += 4)
-    for (int x = box.x + shift; x < box.x + box.width; x += 4) {
+  for (int y = box.y + first_y; y < box.y + box.height; y += 4)
+    for (int x = box.x + first_x; x < box.x + box.width; x += 4) {
       const std::size_t code = std::min<std::size_t>(codes.at(x, y), exposure.size() - 1);
       if (!(exposure[code] > 0)) continue;
       ++histogram[code];
@@ -39,19 +44,22 @@ Brightness brightness_of(const ImageU16& codes, const PixelBox& box, const std::
       top = std::max(top, code);
     }
   if (lit < 16) return {};
-  std::uint32_t below = 0;
-  std::size_t code = 0;
-  while (below + histogram[code] < lit - lit / 10) below += histogram[code++];
-  return {exposure[code], exposure[top]};
+  const auto percentile = [&](double share) {
+    double below = 0;
+    std::size_t code = 0;
+    while (code < top && below + histogram[code] < share * lit) below += histogram[code++];
+    return exposure[code];
+  };
+  return {std::min(percentile(brightest), paper_over_surfaces * percentile(surfaces)), exposure[top]};
 }
 
 std::vector<std::uint16_t> level_table(const std::vector<float>& exposure, const Brightness& brightness) {
   std::vector<std::uint16_t> table(exposure.size());
-  if (!(brightness.bright > 0)) return table;
-  const float shoulder = (255 - knee_level) / std::log(std::max(brightness.top / brightness.bright, 1.5F));
+  if (!(brightness.knee > 0)) return table;
+  const float shoulder = (255 - knee_level) / std::log(std::sqrt(std::max(brightness.top / brightness.knee, 2.F)));
   for (std::size_t code = 0; code < table.size(); ++code) {
-    const float x = exposure[code] / brightness.bright;
-    const float level = x <= 1 ? knee_level * std::max(x, 0.F) : knee_level + shoulder * std::log(x);
+    const float x = std::sqrt(std::max(exposure[code], 0.F) / brightness.knee);
+    const float level = x <= 1 ? knee_level * x : knee_level + shoulder * std::log(x);
     table[code] =
         static_cast<std::uint16_t>(std::clamp(static_cast<int>(std::lround(sixteenths * level)), 0, top_level));
   }
@@ -59,9 +67,10 @@ std::vector<std::uint16_t> level_table(const std::vector<float>& exposure, const
 }
 
 // 1 2 1 along a row, mirrored about its end pixels, which continues a mosaic.
-void smooth_along(const std::vector<std::uint16_t>& in, std::vector<std::uint16_t>& out) {
+template <typename T>
+void smooth_along(const std::vector<T>& in, std::vector<T>& out) {
   const std::size_t n = in.size();
-  const auto sum = [](unsigned a, unsigned b, unsigned c) { return static_cast<std::uint16_t>(a + 2 * b + c); };
+  const auto sum = [](T a, T b, T c) { return static_cast<T>(a + b + b + c); };
   out[0] = sum(in[1], in[0], in[1]);
   for (std::size_t x = 1; x + 1 < n; ++x) out[x] = sum(in[x - 1], in[x], in[x + 1]);
   out[n - 1] = sum(in[n - 2], in[n - 1], in[n - 2]);
@@ -88,14 +97,19 @@ FrameLevels::FrameLevels(const ResponseCurve& response, const PixelFormat& forma
   }
 }
 
+// One knee for all colours, that of the brightest: the sum that the filter makes of them is then linear, too.
 FrameLevels::Stretch FrameLevels::stretch_for(const ImageU16& codes, const PixelBox& box) const {
-  const bool bayer = is_bayer(format_.layout);
-  const std::size_t green = bayer ? 1 : 0;
-  const int shift = bayer && colour_at(format_.layout, box.x, box.y) != 1 ? 1 : 0;
-  const Brightness brightness = brightness_of(codes, box, exposure_[green], shift);
+  Brightness all;
+  const int cell = is_bayer(format_.layout) ? 2 : 1;
+  for (int y = 0; y < cell; ++y)
+    for (int x = 0; x < cell; ++x) {
+      const auto colour = static_cast<std::size_t>(colour_at(format_.layout, box.x + x, box.y + y));
+      const Brightness b = brightness_of(codes, box, exposure_[colour], x, y);
+      all = {std::max(all.knee, b.knee), std::max(all.top, b.top)};
+    }
   Stretch out;
   for (std::size_t c = 0; c < static_cast<std::size_t>(format_.colour_channels()); ++c)
-    out.level[c] = level_table(exposure_[c], brightness);
+    out.level[c] = level_table(exposure_[c], all);
   return out;
 }
 
@@ -136,6 +150,33 @@ ImageU8 FrameLevels::levels(const ImageU16& codes, const PixelBox& box) const {
       read_row(box.height - 2, smooth[2]);
     smooth_across(smooth[0].data(), smooth[1].data(), smooth[2].data(), out.row(y));
     std::rotate(smooth.begin(), smooth.begin() + 1, smooth.end());
+  }
+  return out;
+}
+
+ImageF FrameLevels::linear(const ImageU16& codes, const PixelBox& box) const {
+  check(box.x >= 0 && box.y >= 0 && box.x + box.width <= codes.width && box.y + box.height <= codes.height,
+        "the box lies in the frame");
+  ImageF out(box.width, box.height, 1);
+  for (int y = 0; y < box.height; ++y)
+    for (int x = 0; x < box.width; ++x) {
+      const auto colour = static_cast<std::size_t>(colour_at(format_.layout, box.x + x, box.y + y));
+      out.at(x, y) = exposure_[colour][std::min<std::size_t>(codes.at(box.x + x, box.y + y), last_code_)];
+    }
+  if (!is_bayer(format_.layout) || box.width < 2 || box.height < 2) return out;
+  const auto width = static_cast<std::size_t>(box.width);
+  std::vector<float> row(width);
+  std::vector<std::vector<float>> along(static_cast<std::size_t>(box.height), std::vector<float>(width));
+  for (int y = 0; y < box.height; ++y) {
+    std::copy(out.row(y).begin(), out.row(y).end(), row.begin());
+    smooth_along(row, along[static_cast<std::size_t>(y)]);
+  }
+  const auto mirrored = [&](int y) {
+    return along[static_cast<std::size_t>(y < 0 ? 1 : (y == box.height ? box.height - 2 : y))].data();
+  };
+  for (int y = 0; y < box.height; ++y) {
+    const float *above = mirrored(y - 1), *here = mirrored(y), *below = mirrored(y + 1);
+    for (std::size_t x = 0; x < width; ++x) out.row(y)[x] = (above[x] + 2 * here[x] + below[x]) / 16;
   }
   return out;
 }

@@ -27,10 +27,14 @@ class FrameLevels {
   // Precondition: codes of `format` (mono or Bayer), and a response of as many channels.
   FrameLevels(const ResponseCurve&, const PixelFormat&);
 
-  // Eight bits for TagDetector: proportional to radiance up to what a tenth of the box's lit pixels exceed, with a
-  // logarithmic shoulder above, as TagDetector stretches. Mono pictures are not smoothed.
-  // Precondition: the box lies in the frame; for a mosaic its edges are even.
+  // Eight bits to find tags in: proportional to the square root of radiance, which spends more levels on shadows, with
+  // a logarithmic shoulder above what a hundredth of the box's lit pixels exceed, or twice what a tenth does. Edges are
+  // shifted towards the dark: corners must be aligned on linear().
+  // Mono pictures are not smoothed. Precondition: the box lies in the frame.
   [[nodiscard]] ImageU8 levels(const ImageU16& codes, const PixelBox&) const;
+
+  // The same box, linear, in relative exposure.
+  [[nodiscard]] ImageF linear(const ImageU16& codes, const PixelBox&) const;
 
   // Linear luminance, (R + 2 G + B) / 4, the mean of each block of reduction × reduction pixels (those beyond the last
   // whole block are left out). Scale: relative exposure. Precondition: `reduction` is even, ≥ 2.
