@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hw-sim/capture.h"
+#include "hw-sim/desk_rig.h"
 #include "hw-sim/mirror_plate.h"
 #include "hw-sim/motion.h"
 #include "hw-sim/sensor.h"
@@ -36,7 +36,7 @@ RenderedFrames rendered_frames(int size, int count, int samples, double knee) {
     const Rigid3& pose = poses[static_cast<std::size_t>(5 + i * 60 / count)];
     const auto seed = static_cast<std::uint64_t>(i) + 1;
     CameraFrame frame;
-    frame.codes = sensor.expose(sim::render(tracer, {out.camera, out.cam_from_world, pose, whole, samples, seed}),
+    frame.codes = sensor.expose(sim::render(tracer, {out.camera, out.cam_from_world, pose, whole, samples, seed, {}}),
                                 exposure_s, whole, seed);
     frame.arrival.device_frame = i + 1;
     out.frames.push_back(std::move(frame));
