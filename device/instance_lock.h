@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "device/owned_fd.h"
-#include "device/owned_fd.h"
 
 namespace mf {
 

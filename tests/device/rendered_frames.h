@@ -23,8 +23,8 @@ struct RenderedFrames {
   std::vector<CameraFrame> frames;
   std::vector<Rigid3> cam_from_mirror;
 };
-// `size`: edge in pixels. The whole frame is read out, table and walls too. `knee`: radiance from which on the sensor is
-// logarithmic; paper is at 0.2 to 1.
+// `size`: edge in pixels. The whole frame is read out, table and walls too. `knee`: radiance from which on the sensor
+// is logarithmic; paper is at 0.2 to 1.
 [[nodiscard]] RenderedFrames rendered_frames(int size, int count, int samples, double knee);
 
 struct CornerErrors {
