@@ -61,9 +61,8 @@ void Rig::look_out() {
 void Rig::meter() {
   const RigState before = std::exchange(status_.state, RigState::metering);
   tell_now();
-  const std::optional<MeteringResult> result = keeper_.meter(*options_.metering, {});
+  (void)keeper_.meter(*options_.metering, {});  // what it found is in the description
   status_.state = before;
-  if (result) camera_remark_ = result->remarks.empty() ? "" : result->remarks.front();
   look_out();
   looked_ = RigClock::now();
   told_ = {};

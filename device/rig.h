@@ -94,7 +94,6 @@ class Rig {
   std::int64_t frames_ = 0;   // since the rate was taken last
   std::chrono::steady_clock::time_point rated_;
   std::chrono::steady_clock::time_point looked_;  // at the light
-  std::string camera_remark_;                     // of the metering; stays until the next
 };
 
 }  // namespace mf
