@@ -15,6 +15,7 @@
 #include "common/check.h"
 #include "common/error.h"
 #include "common/fast_deflate.h"
+#include "common/literal_deflate.h"
 
 namespace mf {
 
@@ -225,6 +226,14 @@ Image<Pixel> read_blocks(TIFF* tiff, const Layout& layout, const MemoryFile& mem
   return image;
 }
 
+// More than half of them zero: a picture without noise, or without light. Of every 61 values one is looked at.
+bool repeats_itself(std::span<const std::uint16_t> differences) {
+  constexpr std::size_t each = 61;  // hardly a divisor of a row's length: all columns get their turn
+  std::size_t zeros = 0, seen = 0;
+  for (std::size_t i = 0; i < differences.size(); i += each, ++seen) zeros += differences[i] == 0 ? 1 : 0;
+  return 2 * zeros > seen;
+}
+
 // Each row as the differences of its neighbours, channel by channel (TIFF 6.0, section 14), deflated: what libtiff
 // writes with PREDICTOR_HORIZONTAL, but fast enough for a camera.
 void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::uint16_t> pixels,
@@ -240,7 +249,10 @@ void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::
       to[i] = static_cast<std::uint16_t>(from[i] - from[i - channels]);
   }
   deflated.clear();
-  append_deflated({reinterpret_cast<const std::uint8_t*>(differences.data()), 2 * differences.size()}, deflated);
+  if (repeats_itself(differences))
+    append_deflated({reinterpret_cast<const std::uint8_t*>(differences.data()), 2 * differences.size()}, deflated);
+  else
+    append_deflated_literals(differences, deflated);
   const auto size = static_cast<tmsize_t>(deflated.size());
   check(TIFFWriteRawStrip(tiff, strip, deflated.data(), size) == size, "a TIFF strip is written to memory");
 }
