@@ -72,6 +72,7 @@ void replay_session(const Arguments& a) {
   fmt::print("{}: {} of {} frames with tags ({:.0f} in the median one), {} posed, {:.1f} ms a frame{}\n",
              a.replay.string(), r.with_tags, r.frames, r.median_tags, r.posed, r.median_ms,
              r.covered ? fmt::format(", {:.0f} % of the light covered", 100 * *r.covered) : "");
+  for (const std::string& line : r.damage) fmt::print(stderr, "warning: {}\n", line);
 }
 
 void show(const mf::RigStatus& s) {
