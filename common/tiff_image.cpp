@@ -52,14 +52,15 @@ tmsize_t read_memory(thandle_t handle, void* buffer, tmsize_t size) {
 
 tmsize_t write_memory(thandle_t handle, void* buffer, tmsize_t size) {
   MemoryFile& file = memory_file(handle);
+  const std::string_view bytes(static_cast<const char*>(buffer), static_cast<std::size_t>(size));
   try {
-    const std::uint64_t end = file.position + static_cast<std::uint64_t>(size);
-    if (end > file.written.size()) file.written.resize(end);
+    if (file.position > file.written.size()) file.written.resize(file.position);
+    const std::size_t over = std::min<std::size_t>(bytes.size(), file.written.size() - file.position);
+    file.written.replace(file.position, over, bytes);  // at the end, where nearly all goes, that appends
   } catch (const std::bad_alloc&) {
     return -1;  // no exception may cross libtiff's C frames
   }
-  std::memcpy(file.written.data() + file.position, buffer, static_cast<std::size_t>(size));
-  file.position += static_cast<std::uint64_t>(size);
+  file.position += bytes.size();
   return size;
 }
 

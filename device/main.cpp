@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -80,7 +81,16 @@ void show(const mf::RigStatus& s) {
              s.durable_frames, s.lost_frames, s.gaps, s.queued, s.problem);
 }
 
+// A frame's memory comes and goes many times a second. Given back to the system, every page of it would be a fault
+// anew.
+void keep_memory() {
+  constexpr int larger_than_a_frame = 64 << 20, most_kept = 256 << 20;
+  mallopt(M_MMAP_THRESHOLD, larger_than_a_frame);
+  mallopt(M_TRIM_THRESHOLD, most_kept);
+}
+
 void run(const Arguments& a) {
+  keep_memory();
   const mf::DeviceConfig config = mf::read_device_config(a.config);
   mf::DaemonOptions options;
   options.record_now = a.record || !a.output.empty();
