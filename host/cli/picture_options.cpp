@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/cli/picture_options.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
@@ -11,14 +12,20 @@
 namespace mf {
 
 void add_picture_options(CommandLine& command, PictureArguments& a) {
-  command.option("field", a.field, "light field (.lf.exr)", Presence::required);
+  command.option("light", a.light,
+                 "light field (.lf.exr), or a session folder with response.json and calibration.json, from which the "
+                 "light is resampled as the picture needs it",
+                 Presence::required);
   command.option("object", a.object, "mesh to light: OBJ (world coordinates, Z-up) or glTF", Presence::required);
   command.option("--cameras", a.cameras, "views.json: camera_from_world and K of each view", Presence::required);
   command.option("--view", a.view, "which view of the cameras, from 0");
   command.option("--albedo", a.albedo, "one albedo for the whole object, 0 to 1, instead of the file's colours");
   command.option("--backend", a.backend, "gl, cpu, or auto: gl on a graphics card, else cpu");
-  command.option("--extra-directions", a.options.importance.extra_directions,
-                 "further shadow directions, spent on the brightest parts of the light");
+  command.option("--directions", a.directions,
+                 "a preview with this many directions, the most important ones finely (default: all that there are)");
+  command.option("--extra-directions", a.extra_directions,
+                 "further shadow directions, spent on the brightest parts of the light (default: 700, with "
+                 "--directions at most as many)");
   command.option("--bounce-directions", a.options.bounce_directions,
                  "directions in which light is followed off the object; 0: not at all");
   command.option("--ground-directions", a.options.ground_directions,
@@ -26,6 +33,10 @@ void add_picture_options(CommandLine& command, PictureArguments& a) {
   command.option("--exposure", a.exposure, "for PNG: radiance is multiplied by this; 1 becomes white");
   command.repeatable("-o,--output", a.outputs, "picture to write, .exr (linear) or .png (sRGB); may be given again",
                      Presence::required);
+  command.option("--height", a.session.height_m, "session: height of the light-field plane, as for `resample`");
+  command.option("--proxy", a.session.proxy, "session: what the views are focused on, as for `resample`");
+  command.option("-k", a.session.k, "session: views blended for a ray, as for `resample`");
+  command.values("--rectangle", 4, a.rectangle, "session: x0 y0 x1 y1 of the plane's rectangle, as for `resample`");
   add_json_flag(command, a.json);
 }
 
@@ -39,6 +50,13 @@ void check_picture_arguments(const std::string& command, PictureArguments& a) {
   const auto backend = parse_backend(a.backend);
   if (!backend) throw InputError(command, "--backend", "'" + a.backend + "' is none: use auto, gl or cpu");
   a.options.backend = *backend;
+  if (!a.rectangle.empty()) a.session.rectangle = {a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
+  if (a.directions && *a.directions < 1) throw InputError(command, "--directions", "must be at least 1");
+  LightOptions& light = a.light_options;
+  light.directions = a.directions.value_or(0);
+  int& extra = light.importance.extra_directions;
+  extra = a.extra_directions.value_or(std::min(extra, a.directions.value_or(extra)));
+  if (const auto problem = light.validate()) throw InputError(command, "", *problem);
   if (const auto problem = a.options.validate()) throw InputError(command, "", *problem);
 }
 
@@ -60,9 +78,10 @@ std::string output_lines(const PictureArguments& a) {
   return lines;
 }
 
-nlohmann::json rendering_summary(const RenderResult& r, double seconds) {
-  return {{"backend", r.backend},    {"lights", r.lights},        {"points", r.fragments},
-          {"width", r.object.width}, {"height", r.object.height}, {"seconds", seconds}};
+nlohmann::json rendering_summary(const RenderResult& r, const StageSeconds& stages, double seconds) {
+  return {{"backend", r.backend},     {"lights", r.lights},        {"points", r.fragments},
+          {"width", r.object.width},  {"height", r.object.height}, {"seconds", seconds},
+          {"seconds_by_stage", stages}};
 }
 
 }  // namespace mf

@@ -86,32 +86,42 @@ std::optional<std::string> ResampleOptions::validate() const {
   return std::nullopt;
 }
 
-ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                        const ResampleOptions& options, const Progress& progress) {
+FocusResult focus(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const ResampleOptions& options,
+                  const Progress& progress) {
   check(!options.validate().has_value(), "resample options are validated by the caller");
-  ResampleResult result;
-  result.views = views.size();
+  FocusResult result;
   LightField& field = result.field;
   field.plane = rectangle;
   field.resolution = options.size;
   field.directions = geodesic_hemisphere(options.directions);
-  const int k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
-
-  auto start = Clock::now();
+  result.k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
   report_progress(progress, "focusing", 0);
   const std::vector<Emitter> emitters = options.proxy == "plane" ? std::vector<Emitter>{} : find_emitters(views);
-  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, result.sphere_scores);
+  field.surroundings = choose_surroundings(views, rectangle, options.proxy, result.k, emitters, result.sphere_scores);
   const EmitterBlender emitter_blender(views, field.surroundings, emitters, rectangle);
   field.emitters = emitter_blender.emitters();
   if (!field.surroundings.is_plane())
     field.surroundings.panorama = make_panorama(views, field.surroundings, emitter_blender, panorama_width);
   report_progress(progress, "focusing", 1);
+  field.options_json = options_to_json(options, result.k, field.surroundings);
+  return result;
+}
+
+ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
+                        const ResampleOptions& options, const Progress& progress) {
+  auto start = Clock::now();
+  FocusResult focused = focus(views, rectangle, options, progress);
+  ResampleResult result;
+  result.views = views.size();
+  result.sphere_scores = std::move(focused.sphere_scores);
+  result.field = std::move(focused.field);
   result.seconds["focusing"] = seconds_since(start);
-  field.options_json = options_to_json(options, k, field.surroundings);
 
   start = Clock::now();
+  LightField& field = result.field;
   field.rgbc.assign(field.directions.size() * field.texel_count(), Eigen::Vector4f::Zero());
-  fill_tiles(views, field, emitter_blender, k, progress);
+  const EmitterBlender emitters(views, field.surroundings, field.emitters);
+  fill_tiles(views, field, emitters, focused.k, progress);
   result.seconds["blending"] = seconds_since(start);
   result.mean_confidence = mean_confidence(field);
   return result;

@@ -36,6 +36,16 @@ struct ResampleResult {
   double mean_confidence = 0;  // cosine-weighted over directions, mean over the plane
 };
 
+// A light field but for its texels: what the views are focused on, and the emitters among it, are found.
+struct FocusResult {
+  LightField field;  // no texels yet
+  int k = 0;         // views blended for a ray
+  std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
+};
+// Preconditions as resample, of which this is the first half.
+[[nodiscard]] FocusResult focus(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
+                                const ResampleOptions&, const Progress&);
+
 // The views resampled into L(p, ω) on a plane parallel to the ground (Ihrke et al. 2008, §4.3), each ray blended from
 // the k best views (Buehler et al. 2001, §4.1), seen over the proxy: see docs/light_field.md.
 // `views` see the world frame; `rectangle` is the plane's part to cover.

@@ -4,26 +4,18 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "host/render/light_set.h"
+#include "host/light_field/light_tiles.h"
 #include "host/render/mesh.h"
 
 namespace mf {
 
-// What the receiving plane (z = 0 in the plane frame) sends up around the object: outgoing radiance, as PlaneImage.
-struct GroundRadiance {
-  Eigen::Vector2f min_m = Eigen::Vector2f::Zero();
-  Eigen::Vector2f max_m = Eigen::Vector2f::Zero();
-  int width = 0;
-  int height = 0;
-  std::vector<Eigen::Vector4f> texels;  // row 0 at max y; red, green, blue, unused
-
-  [[nodiscard]] PlaneImage image() const { return {min_m, max_m, width, height, texels.data()}; }
+// What the receiving plane (z = 0 in the plane frame) sends up around the object: outgoing radiance.
+using GroundRadiance = PlaneTile;
+}
 
   // Where the middle of a texel lies on the plane.
-  [[nodiscard]] Eigen::Vector2f position(int column, int row) const {
-    const Eigen::Vector2f size = max_m - min_m;
-    return {min_m.x() + size.x() * (static_cast<float>(column) + 0.5F) / static_cast<float>(width),
-            max_m.y() - size.y() * (static_cast<float>(row) + 0.5F) / static_cast<float>(height)};
+  [[nodiscard]] Eigen::Vector2f position(int column, int row) const { return image().position(column, row); }
+};
   }
 };
 
