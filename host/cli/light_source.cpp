@@ -39,8 +39,7 @@ IncidentLight light_of(const Capture& capture, const Bounds& object, const Light
                        StageSeconds& seconds) {
   const LightField& field = capture.focused.field;
   auto start = Clock::now();
-  const LightPlan plan =
-      plan_light(field.directions, light_of_capture(capture, object), object, field.plane, options);
+  const LightPlan plan = plan_light(field.directions, light_of_capture(capture, object), object, field.plane, options);
   seconds["choosing"] = seconds_since(start);
   start = Clock::now();
   std::vector<PlaneTile> tiles =

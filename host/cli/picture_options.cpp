@@ -79,9 +79,8 @@ std::string output_lines(const PictureArguments& a) {
 }
 
 nlohmann::json rendering_summary(const RenderResult& r, const StageSeconds& stages, double seconds) {
-  return {{"backend", r.backend},     {"lights", r.lights},        {"points", r.fragments},
-          {"width", r.object.width},  {"height", r.object.height}, {"seconds", seconds},
-          {"seconds_by_stage", stages}};
+  return {{"backend", r.backend},      {"lights", r.lights}, {"points", r.fragments},     {"width", r.object.width},
+          {"height", r.object.height}, {"seconds", seconds}, {"seconds_by_stage", stages}};
 }
 
 }  // namespace mf

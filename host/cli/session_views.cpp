@@ -11,8 +11,7 @@ namespace mf {
 SessionViews load_session_views(const std::string& command, const std::filesystem::path& folder,
                                 const ResampleOptions& options, const Progress& progress) {
   if (const auto problem = options.validate())
-    throw InputError(command, "--" + problem->substr(0, problem->find(':')),
-                     problem->substr(problem->find(':') + 2));
+    throw InputError(command, "--" + problem->substr(0, problem->find(':')), problem->substr(problem->find(':') + 2));
   const SessionReader session(folder);
   const ResponseCurve response = response_of(session);
   const Calibration calibration = calibration_of(session);

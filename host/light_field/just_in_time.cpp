@@ -93,7 +93,8 @@ class Worker {
     if (!any_emitter) return smooth;
     for (int y = 0; y < emitted.height; ++y)
       for (int x = 0; x < emitted.width; ++x)
-        emitted.texels[static_cast<std::size_t>(y * emitted.width + x)] += sample(smooth.image(), emitted.position(x, y));
+        emitted.texels[static_cast<std::size_t>(y * emitted.width + x)] +=
+            sample(smooth.image(), emitted.position(x, y));
     return emitted;
   }
 
@@ -178,8 +179,7 @@ std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views
   std::vector<ShadedEmitter> dark_emitters = focused.emitters;
   for (ShadedEmitter& e : dark_emitters) e.radiance.setZero();
   const EmitterBlender dark(views, focused.surroundings, std::move(dark_emitters));
-  tbb::enumerable_thread_specific<Worker> workers(
-      [&] { return Worker(views, focused, dark, k, options.most_texels); });
+  tbb::enumerable_thread_specific<Worker> workers([&] { return Worker(views, focused, dark, k, options.most_texels); });
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(),
                     [&](std::size_t i) { tiles[i] = workers.local().fill(requests[i]); });

@@ -38,8 +38,8 @@ struct ResampleResult {
 
 // A light field but for its texels: what the views are focused on, and the emitters among it, are found.
 struct FocusResult {
-  LightField field;  // no texels yet
-  int k = 0;         // views blended for a ray
+  LightField field;                        // no texels yet
+  int k = 0;                               // views blended for a ray
   std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
 };
 // Preconditions as resample, of which this is the first half.

@@ -11,13 +11,6 @@ namespace mf {
 
 // What the receiving plane (z = 0 in the plane frame) sends up around the object: outgoing radiance.
 using GroundRadiance = PlaneTile;
-}
-
-  // Where the middle of a texel lies on the plane.
-  [[nodiscard]] Eigen::Vector2f position(int column, int row) const { return image().position(column, row); }
-};
-  }
-};
 
 // The part of the plane that matters to an object and to which it matters: a square about its bounding sphere, black.
 // Five radii to each side: a patch of the object sees 95 % of its light from below within (cosine-weighted, at the

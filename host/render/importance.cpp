@@ -29,8 +29,8 @@ float luminance(const Eigen::Vector3f& rgb) {
 double light_of_surroundings(const LightField& field, const Eigen::Vector3f& x, const Eigen::Matrix3f& world_from_plane,
                              std::size_t cell) {
   const Surroundings& s = field.surroundings;
-  const Eigen::Vector3f parallax = s.inverse_distance_along(x, world_from_plane * field.directions.directions[cell]) *
-                                   (x - s.centre_in_world);
+  const Eigen::Vector3f parallax =
+      s.inverse_distance_along(x, world_from_plane * field.directions.directions[cell]) * (x - s.centre_in_world);
   double sum = 0;
   for (const CellSample& part : split_cell(field.directions, cell, 0)) {
     const Eigen::Vector3f seen_from_centre = (world_from_plane * part.direction + parallax).normalized();
@@ -43,7 +43,8 @@ double light_of_surroundings(const LightField& field, const Eigen::Vector3f& x, 
 // Adds what an emitter brings to points of a box, by the cells in which they see it.
 class EmitterLight {
  public:
-  EmitterLight(const LightField& field, const Bounds& object) : field_(field), object_(object), locator_(field.directions) {}
+  EmitterLight(const LightField& field, const Bounds& object)
+      : field_(field), object_(object), locator_(field.directions) {}
 
   void add(const ShadedEmitter& e, std::vector<double>& light) const {
     for (int i = 0; i < points * points * points; ++i) {
@@ -58,8 +59,7 @@ class EmitterLight {
 
   void add_seen_from(const Eigen::Vector3f& x, const ShadedEmitter& e, std::vector<double>& light) const {
     const Rigid3& world_from_plane = field_.plane.world_from_plane;
-    const Eigen::Vector3f to =
-        (world_from_plane.inverse() * e.emitter.position.cast<double>()).cast<float>() - x;
+    const Eigen::Vector3f to = (world_from_plane.inverse() * e.emitter.position.cast<double>()).cast<float>() - x;
     const Eigen::Vector3f across = to.unitOrthogonal(), up = to.normalized().cross(across);
     const float sine = e.emitter.radius_m / std::max(to.norm(), e.emitter.radius_m);
     constexpr int samples = 6 * rings * rings;
@@ -67,14 +67,14 @@ class EmitterLight {
     for (int k = 0; k < samples; ++k) {  // equal areas
       const float radius = e.emitter.radius_m * std::sqrt((static_cast<float>(k) + 0.5F) / samples);
       const float angle = static_cast<float>(k) * 2.3999632F;  // golden
-      const Eigen::Vector3f d =
-          (to + radius * (std::cos(angle) * across + std::sin(angle) * up)).normalized();
+      const Eigen::Vector3f d = (to + radius * (std::cos(angle) * across + std::sin(angle) * up)).normalized();
       if (d.z() < 0.02F) continue;  // looks along the plane: outside every rectangle
       const Eigen::Vector3f p = x - d * (x.z() / d.z());
       const auto visible = e.visibility((world_from_plane * p.cast<double>()).cast<float>(),
                                         (world_from_plane.rotation * d.cast<double>()).cast<float>());
       const DirectionWeights w = locator_.locate(d);
-      const auto nearest = static_cast<std::size_t>(std::max_element(w.weight.begin(), w.weight.end()) - w.weight.begin());
+      const auto nearest =
+          static_cast<std::size_t>(std::max_element(w.weight.begin(), w.weight.end()) - w.weight.begin());
       light[w.index[nearest]] += static_cast<double>(weight * visible.value_or(1) * luminance(e.radiance));
     }
   }
@@ -175,8 +175,8 @@ std::vector<double> light_of_tiles(const DirectionSet& set, std::span<const Plan
     double sum = 0;
     for (const Eigen::Vector4f& texel : std::span(tiles[i].texels, tiles[i].texel_count()))
       sum += static_cast<double>(luminance(texel.head<3>()));
-    light[i] = std::max(0., sum / static_cast<double>(tiles[i].texel_count())) *
-               static_cast<double>(set.solid_angles_sr[i]);
+    light[i] =
+        std::max(0., sum / static_cast<double>(tiles[i].texel_count())) * static_cast<double>(set.solid_angles_sr[i]);
   });
   return light;
 }
@@ -212,8 +212,7 @@ std::vector<CellGroup> group_cells(const DirectionSet& set, std::span<const doub
     for (std::vector<std::uint32_t>& half : cut(set, widest))
       candidates.push(make_candidate(set, traced, std::move(half)));
   }
-  for (; !candidates.empty(); candidates.pop())
-    groups.push_back(make_group(set, traced, candidates.top().cells));
+  for (; !candidates.empty(); candidates.pop()) groups.push_back(make_group(set, traced, candidates.top().cells));
   return groups;
 }
 

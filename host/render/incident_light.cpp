@@ -48,8 +48,8 @@ LightPlan plan_light(const DirectionSet& set, std::span<const double> light, con
   plan.groups = group_cells(set, light, options.directions > 0 ? options.directions : cells);
   if (plan.groups.size() > bounce_directions) plan.bounce_groups = group_cells(set, light, bounce_directions);
   for (const std::vector<CellGroup>* groups : {&plan.groups, &plan.bounce_groups})
-    for (TileRequest& request : options.plane ? tiles_for_plane(*groups, rectangle)
-                                              : tiles_for_object(set, *groups, object_in_plane))
+    for (TileRequest& request :
+         options.plane ? tiles_for_plane(*groups, rectangle) : tiles_for_object(set, *groups, object_in_plane))
       plan.requests.push_back(std::move(request));
   return plan;
 }
@@ -58,7 +58,8 @@ IncidentLight incident_light(const DirectionSet& set, const PlaneRectangle& rect
                              std::vector<PlaneTile> tiles, const LightOptions& options) {
   check(tiles.size() == plan.requests.size(), "a tile for each request");
   std::vector<PlaneImage> of_groups = images(tiles);
-  std::vector<PlaneImage> of_bounce(of_groups.begin() + static_cast<std::ptrdiff_t>(plan.groups.size()), of_groups.end());
+  std::vector<PlaneImage> of_bounce(of_groups.begin() + static_cast<std::ptrdiff_t>(plan.groups.size()),
+                                    of_groups.end());
   of_groups.resize(plan.groups.size());
   IncidentLight light = assemble(set, rectangle, plan, std::move(of_groups), std::move(of_bounce), options);
   light.tiles = std::move(tiles);

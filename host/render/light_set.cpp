@@ -37,7 +37,7 @@ std::vector<float> weights_on_plane(const LightSet& set) {
   return weights;
 }
 
-bool same_layout(const PlaneImage& a, const PlaneImage& b) {
+bool same_grid(const PlaneImage& a, const PlaneImage& b) {
   return a.width == b.width && a.height == b.height && a.min_m == b.min_m && a.max_m == b.max_m;
 }
 
@@ -75,9 +75,8 @@ LightSet make_light_set(const LightField& field, const ImportanceOptions& option
 }
 
 PlaneTile bare_irradiance(const LightSet& set) {
-  const auto largest = std::max_element(set.images.begin(), set.images.end(), [](const auto& a, const auto& b) {
-    return a.texel_count() < b.texel_count();
-  });
+  const auto largest = std::max_element(set.images.begin(), set.images.end(),
+                                        [](const auto& a, const auto& b) { return a.texel_count() < b.texel_count(); });
   if (largest == set.images.end()) return {};
   PlaneTile sum{largest->min_m, largest->max_m, largest->width, largest->height, {}};
   sum.texels.assign(largest->texel_count(), Eigen::Vector4f::Zero());
@@ -86,7 +85,7 @@ PlaneTile bare_irradiance(const LightSet& set) {
     Eigen::Vector4f* row = sum.texels.data() + static_cast<std::ptrdiff_t>(y) * sum.width;
     for (std::size_t i = 0; i < set.images.size(); ++i) {
       const PlaneImage& image = set.images[i];
-      const bool same = same_layout(image, *largest);
+      const bool same = same_grid(image, *largest);
       const Eigen::Vector4f* same_row = image.texels + static_cast<std::ptrdiff_t>(y) * sum.width;
       for (int x = 0; x < sum.width; ++x)
         row[x] += weights[i] * (same ? same_row[x] : sample(image, sum.position(x, y)));
