@@ -18,6 +18,9 @@ namespace {
 
 constexpr int emitter_step = 4;    // texels of the light field between the points at which emitters are drawn, as there
 constexpr int emitter_splits = 3;  // a cell's parts for them: 6 · 2³, as there
+// A preview's texels are no larger. The resampler looks for emitters at every fourth texel, and must not step over the
+// glare beside one, which it takes to reach 12 cm.
+constexpr float coarsest_texel_m = 0.05F;
 
 struct Rectangle {
   Eigen::Vector2f min_m, max_m;
@@ -101,10 +104,14 @@ class Worker {
  private:
   // Along each side, in whole blocks of the resampler.
   [[nodiscard]] int texels_for(const Rectangle& r) const {
-    constexpr int block = 8;
     const Eigen::Vector2f part = (r.max_m - r.min_m).cwiseQuotient(focused_.plane.size_m().cast<float>());
-    const float texels = part.maxCoeff() * static_cast<float>(focused_.resolution);
-    return std::min(most_texels_, block * std::max(1, static_cast<int>(std::ceil(texels / block))));
+    const int as_field = whole_blocks(part.maxCoeff() * static_cast<float>(focused_.resolution));
+    const int fewest = whole_blocks((r.max_m - r.min_m).maxCoeff() / coarsest_texel_m);
+    return std::min(as_field, std::max(fewest, most_texels_));
+  }
+  static int whole_blocks(float texels) {
+    constexpr int block = 8;
+    return block * std::max(1, static_cast<int>(std::ceil(texels / block)));
   }
 
   // Adds share · (the emitters' light, mean over the cell). Returns whether there is any.

@@ -10,9 +10,9 @@
 namespace mf {
 
 struct JustInTimeOptions {
-  // A tile is as fine as the light field's, but has no more than this many texels along a side. What comes from far off
-  // varies slowly over the plane, and small bright sources are drawn apart, always as finely as the light field has
-  // them: so a preview needs few. A multiple of 8, at least 8.
+  // A tile is as fine as the light field's, but has no more than this many texels along a side (more only where they
+  // would be larger than 5 cm). What comes from far off varies slowly over the plane, and small bright sources are
+  // drawn apart, always as finely as the light field has them: so a preview needs few. A multiple of 8, at least 8.
   int most_texels = 8;
 };
 
