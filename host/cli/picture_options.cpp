@@ -24,12 +24,14 @@ void add_picture_options(CommandLine& command, PictureArguments& a) {
   command.option("--directions", a.directions,
                  "a preview with this many directions, the most important ones finely (default: all that there are)");
   command.option("--extra-directions", a.extra_directions,
-                 "further shadow directions, spent on the brightest parts of the light (default: 700, with "
-                 "--directions at most as many)");
-  command.option("--bounce-directions", a.options.bounce_directions,
-                 "directions in which light is followed off the object; 0: not at all");
-  command.option("--ground-directions", a.options.ground_directions,
-                 "directions in which the object sees the ground's light");
+                 "further shadow directions, spent on the brightest parts of the light (default: 700, in a preview at "
+                 "most --directions)");
+  command.option("--bounce-directions", a.bounce_directions,
+                 "directions in which light is followed off the object; 0: not at all (default: 500, in a preview at "
+                 "most --directions)");
+  command.option("--ground-directions", a.ground_directions,
+                 "directions in which the object sees the ground's light (default: 800, in a preview at most "
+                 "--directions)");
   command.option("--exposure", a.exposure, "for PNG: radiance is multiplied by this; 1 becomes white");
   command.repeatable("-o,--output", a.outputs, "picture to write, .exr (linear) or .png (sRGB); may be given again",
                      Presence::required);
@@ -39,6 +41,22 @@ void add_picture_options(CommandLine& command, PictureArguments& a) {
   command.values("--rectangle", 4, a.rectangle, "session: x0 y0 x1 y1 of the plane's rectangle, as for `resample`");
   add_json_flag(command, a.json);
 }
+
+namespace {
+
+// What was given counts; else the usual number, of which a preview takes no more than it has directions.
+void set_directions(PictureArguments& a) {
+  constexpr int fewest = 16;  // that the ground and the bounce may have
+  const auto set = [&](int& usual, std::optional<int> given) {
+    usual = given.value_or(std::min(usual, std::max(fewest, a.directions.value_or(usual))));
+  };
+  a.light_options.directions = a.directions.value_or(0);
+  set(a.light_options.importance.extra_directions, a.extra_directions);
+  set(a.options.bounce_directions, a.bounce_directions);
+  set(a.options.ground_directions, a.ground_directions);
+}
+
+}  // namespace
 
 void check_picture_arguments(const std::string& command, PictureArguments& a) {
   for (const std::filesystem::path& output : a.outputs)
@@ -52,11 +70,8 @@ void check_picture_arguments(const std::string& command, PictureArguments& a) {
   a.options.backend = *backend;
   if (!a.rectangle.empty()) a.session.rectangle = {a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
   if (a.directions && *a.directions < 1) throw InputError(command, "--directions", "must be at least 1");
-  LightOptions& light = a.light_options;
-  light.directions = a.directions.value_or(0);
-  int& extra = light.importance.extra_directions;
-  extra = a.extra_directions.value_or(std::min(extra, a.directions.value_or(extra)));
-  if (const auto problem = light.validate()) throw InputError(command, "", *problem);
+  set_directions(a);
+  if (const auto problem = a.light_options.validate()) throw InputError(command, "", *problem);
   if (const auto problem = a.options.validate()) throw InputError(command, "", *problem);
 }
 

@@ -25,7 +25,7 @@ struct PictureArguments {
   std::string backend = "auto";
   double exposure = 1;
   std::optional<int> directions;
-  std::optional<int> extra_directions;
+  std::optional<int> extra_directions, bounce_directions, ground_directions;
   ResampleOptions session;
   std::vector<double> rectangle;
   RenderOptions options;
