@@ -29,7 +29,7 @@ struct Rectangle {
 // The part of [low, high] that [from, to] asks for, at least `least` wide.
 void keep_inside(float low, float high, float least, float& from, float& to) {
   from = std::clamp(from, low, high - least);
-  to = std::clamp(to, from + least, high);
+  to = std::clamp(to, std::min(from + least, high), high);
 }
 
 Rectangle inside(const LightField& field, const TileRequest& request) {
