@@ -9,6 +9,7 @@
 #include "common/response_curve.h"
 #include "common/session.h"
 #include "host/cli/command.h"
+#include "host/cli/peak_memory.h"
 #include "host/cli/run_resample.h"
 #include "host/cli/session_files.h"
 
@@ -38,7 +39,8 @@ nlohmann::json summarize(const ResampleResult& r) {
           {"rectangle_m", {plane.min_m.x(), plane.min_m.y(), plane.max_m.x(), plane.max_m.y()}},
           {"height_m", plane.world_from_plane.translation.z()},
           {"mean_confidence", r.mean_confidence},
-          {"seconds", r.seconds}};
+          {"seconds", r.seconds},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 void run(ResampleArguments& a) {
@@ -61,7 +63,7 @@ ResampleResult run_resample(const std::filesystem::path& folder, const std::file
   if (const auto problem = options.validate())
     throw InputError("resample", "--" + problem->substr(0, problem->find(':')),
                      problem->substr(problem->find(':') + 2));
-  auto start = std::chrono::steady_clock::now();
+  const auto start = std::chrono::steady_clock::now();
   const SessionReader session(folder);
   const ResponseCurve response = response_of(session);
   const Calibration calibration = calibration_of(session);
@@ -77,12 +79,9 @@ ResampleResult run_resample(const std::filesystem::path& folder, const std::file
                      "no mirror view looks through the plane at this --height: lower it, or give --rectangle");
   const std::vector<FieldView> views = load_field_views(session, response, calibration, {}, progress);
   const double loading = seconds_since(start);
-  ResampleResult result = resample(views, *rectangle, options, progress);
-  result.field.absolute = response.absolute;
+  ResampleResult result = resample_to_file(output, views, *rectangle, options, response.absolute, progress);
   result.seconds["loading"] = loading;
-  start = std::chrono::steady_clock::now();
-  write_light_field(output, result.field);
-  result.seconds["writing"] = seconds_since(start);
+  result.seconds["total"] = seconds_since(start);
   return result;
 }
 
