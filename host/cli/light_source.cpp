@@ -24,12 +24,12 @@ JustInTimeOptions quality(const LightField& field, const LightOptions& options) 
 
 // What each cell brings where the surroundings have no panorama: every cell has to be asked, roughly.
 std::vector<double> light_of_capture(const Capture& capture, const Bounds& object) {
-  const LightField& field = capture.focused.field;
+  const LightField& field = capture.focused;
   if (!field.surroundings.panorama.empty()) return light_on(field, object);
   std::vector<TileRequest> requests;
   for (std::uint32_t i = 0; i < field.directions.size(); ++i)
     requests.push_back({{i}, field.plane.min_m.cast<float>(), field.plane.max_m.cast<float>()});
-  const std::vector<PlaneTile> tiles = resample_just_in_time(capture.views, field, capture.focused.k, requests, {});
+  const std::vector<PlaneTile> tiles = resample_just_in_time(capture.views, field, capture.k, requests, {});
   std::vector<PlaneImage> images;
   for (const PlaneTile& tile : tiles) images.push_back(tile.image());
   return light_of_tiles(field.directions, images);
@@ -37,13 +37,13 @@ std::vector<double> light_of_capture(const Capture& capture, const Bounds& objec
 
 IncidentLight light_of(const Capture& capture, const Bounds& object, const LightOptions& options,
                        StageSeconds& seconds) {
-  const LightField& field = capture.focused.field;
+  const LightField& field = capture.focused;
   auto start = Clock::now();
   const LightPlan plan = plan_light(field.directions, light_of_capture(capture, object), object, field.plane, options);
   seconds["choosing"] = seconds_since(start);
   start = Clock::now();
   std::vector<PlaneTile> tiles =
-      resample_just_in_time(capture.views, field, capture.focused.k, plan.requests, quality(field, options));
+      resample_just_in_time(capture.views, field, capture.k, plan.requests, quality(field, options));
   IncidentLight light = incident_light(field.directions, field.plane, plan, std::move(tiles), options);
   seconds["resampling"] = seconds_since(start);
   return light;
@@ -74,16 +74,15 @@ LightSource open_light_source(const std::string& command, const std::filesystem:
   SessionViews session = load_session_views(command, path, options, progress);
   seconds["loading"] = seconds_since(start);
   start = Clock::now();
-  FocusResult focused = focus(session.views, session.rectangle, options, progress);
-  focused.field.absolute = session.absolute;
+  const Resampling focused(session.views, session.rectangle, options, progress);
   seconds["focusing"] = seconds_since(start);
-  return Capture{std::move(session.views), std::move(focused)};
+  return Capture{std::move(session.views), focused.field(), focused.k()};
 }
 
 IncidentLight light_for(const LightSource& source, const TriangleMesh& mesh_in_world, const LightOptions& options,
                         StageSeconds& seconds) {
   const auto* field = std::get_if<LightField>(&source);
-  const PlaneRectangle& plane = field != nullptr ? field->plane : std::get<Capture>(source).focused.field.plane;
+  const PlaneRectangle& plane = field != nullptr ? field->plane : std::get<Capture>(source).focused.plane;
   const Bounds object = bounds_of(transformed(plane.world_from_plane.inverse(), mesh_in_world));
   if (field == nullptr) return light_of(std::get<Capture>(source), object, options, seconds);
   const auto start = Clock::now();

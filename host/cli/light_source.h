@@ -14,10 +14,11 @@
 
 namespace mf {
 
-// A capture from which light is resampled when a picture needs it.
+// A capture, focused, from which light is resampled when a picture needs it.
 struct Capture {
   std::vector<FieldView> views;
-  FocusResult focused;
+  LightField focused;  // no texels
+  int k = 0;           // views blended for a ray
 };
 using LightSource = std::variant<LightField, Capture>;
 

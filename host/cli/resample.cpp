@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "host/cli/command.h"
+#include "host/cli/peak_memory.h"
 #include "host/cli/run_resample.h"
 #include "host/cli/session_views.h"
 
@@ -35,7 +36,8 @@ nlohmann::json summarize(const ResampleResult& r) {
           {"rectangle_m", {plane.min_m.x(), plane.min_m.y(), plane.max_m.x(), plane.max_m.y()}},
           {"height_m", plane.world_from_plane.translation.z()},
           {"mean_confidence", r.mean_confidence},
-          {"seconds", r.seconds}};
+          {"seconds", r.seconds},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 void run(ResampleArguments& a) {
@@ -55,15 +57,13 @@ void run(ResampleArguments& a) {
 
 ResampleResult run_resample(const std::filesystem::path& folder, const std::filesystem::path& output,
                             const ResampleOptions& options, const Progress& progress) {
-  auto start = std::chrono::steady_clock::now();
+  const auto start = std::chrono::steady_clock::now();
   const SessionViews session = load_session_views("resample", folder, options, progress);
   const double loading = seconds_since(start);
-  ResampleResult result = resample(session.views, session.rectangle, options, progress);
-  result.field.absolute = session.absolute;
+  ResampleResult result =
+      resample_to_file(output, session.views, session.rectangle, options, session.absolute, progress);
   result.seconds["loading"] = loading;
-  start = std::chrono::steady_clock::now();
-  write_light_field(output, result.field);
-  result.seconds["writing"] = seconds_since(start);
+  result.seconds["total"] = seconds_since(start);
   return result;
 }
 

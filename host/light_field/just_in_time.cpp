@@ -10,6 +10,7 @@
 
 #include "common/check.h"
 #include "host/light_field/emitter_blender.h"
+#include "host/light_field/plane_tiles.h"
 #include "host/light_field/tile_resampler.h"
 
 namespace mf {
@@ -21,6 +22,10 @@ constexpr int emitter_splits = 3;  // a cell's parts for them: 6 · 2³, as ther
 // A preview's texels are no larger. The resampler looks for emitters at every fourth texel, and must not step over the
 // glare beside one, which it takes to reach 12 cm.
 constexpr float coarsest_texel_m = 0.05F;
+
+int whole_blocks(float texels) {
+  return block_side * std::max(1, static_cast<int>(std::ceil(texels / static_cast<float>(block_side))));
+}
 
 struct Rectangle {
   Eigen::Vector2f min_m, max_m;
@@ -109,10 +114,6 @@ class Worker {
     const int fewest = whole_blocks((r.max_m - r.min_m).maxCoeff() / coarsest_texel_m);
     return std::min(as_field, std::max(fewest, most_texels_));
   }
-  static int whole_blocks(float texels) {
-    constexpr int block = 8;
-    return block * std::max(1, static_cast<int>(std::ceil(texels / block)));
-  }
 
   // Adds share · (the emitters' light, mean over the cell). Returns whether there is any.
   bool add_emitters(std::uint32_t cell, float share, PlaneTile& emitted);
@@ -177,11 +178,40 @@ bool Worker::add_emitters(std::uint32_t cell, float share, PlaneTile& emitted) {
   return !parts_.empty();
 }
 
+// With the plane as proxy a point of it is one pixel of a view for all directions: the views are warped onto it once.
+std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const LightField& focused, int k,
+                                      std::span<const TileRequest> requests, int most_texels) {
+  LightField part;
+  part.plane = focused.plane;
+  part.directions = focused.directions;
+  const int coarsest = whole_blocks(static_cast<float>(focused.plane.size_m().maxCoeff()) / coarsest_texel_m);
+  part.resolution = std::min(focused.resolution, std::max(coarsest, most_texels));
+  const RectifiedViews rectified(views, part.plane, part.resolution);
+  tbb::enumerable_thread_specific<PlaneTiles> resamplers([&] { return PlaneTiles(rectified, part, k); });
+  std::vector<PlaneTile> tiles(requests.size());
+  tbb::parallel_for(std::size_t{0}, requests.size(), [&](std::size_t i) {
+    PlaneTile& tile = tiles[i];
+    tile = {part.plane.min_m.cast<float>(), part.plane.max_m.cast<float>(), part.resolution, part.resolution, {}};
+    tile.texels.assign(part.texel_count(), Eigen::Vector4f::Zero());
+    std::vector<Eigen::Vector4f> of_cell(part.texel_count());
+    float solid_angle = 0;
+    for (const std::uint32_t cell : requests[i].cells) {
+      resamplers.local().fill(cell, of_cell.data());
+      solid_angle += part.directions.solid_angles_sr[cell];
+      for (std::size_t t = 0; t < of_cell.size(); ++t)
+        tile.texels[t] += part.directions.solid_angles_sr[cell] * of_cell[t];
+    }
+    for (Eigen::Vector4f& texel : tile.texels) texel /= solid_angle;
+  });
+  return tiles;
+}
+
 }  // namespace
 
 std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views, const LightField& focused, int k,
                                              std::span<const TileRequest> requests, const JustInTimeOptions& options) {
   check(options.most_texels >= 8 && options.most_texels % 8 == 0, "a multiple of 8 texels");
+  if (focused.surroundings.is_plane()) return over_the_plane(views, focused, k, requests, options.most_texels);
   // The emitters without their light: rays that meet them are black, and views that show their glare have no say.
   std::vector<ShadedEmitter> dark_emitters = focused.emitters;
   for (ShadedEmitter& e : dark_emitters) e.radiance.setZero();

@@ -18,10 +18,11 @@ struct JustInTimeOptions {
 
 // The light of some cells over some parts of the plane, straight from the views: what merged_tiles makes of the whole
 // light field, without the rest of it (Ihrke et al. 2008, future work). `focused` is a light field without texels
-// (see focus), whose resolution says how finely emitters are drawn; k views are blended for a ray.
+// (Resampling::field), whose resolution says how finely emitters are drawn; k views are blended for a ray.
 //
 // The tiles reach at least over the requests' rectangles, and no farther than the light field's, which a request
-// beyond it is moved to: there the rim's value holds on.
+// beyond it is moved to: there the rim's value holds on. With the plane as proxy they are over all of it: few texels
+// of everything cost no more there.
 [[nodiscard]] std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views,
                                                            const LightField& focused, int k,
                                                            std::span<const TileRequest>, const JustInTimeOptions&);

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/light_field/resample.h"
-#include "host/light_field/panorama.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "common/check.h"
+#include "host/light_field/light_field_writer.h"
+#include "host/light_field/panorama.h"
+#include "host/light_field/plane_tiles.h"
 #include "host/light_field/tile_resampler.h"
 
 namespace mf {
@@ -48,30 +50,6 @@ std::string options_to_json(const ResampleOptions& o, int k, const Surroundings&
   return json.dump();
 }
 
-double mean_confidence(const LightField& field) {
-  double sum = 0, weights = 0;
-  for (std::size_t i = 0; i < field.directions.size(); ++i) {
-    const double w = static_cast<double>(field.directions.solid_angles_sr[i] * field.directions.directions[i].z());
-    double tile = 0;
-    for (std::size_t t = 0; t < field.texel_count(); ++t) tile += static_cast<double>(field.tile(i)[t].w());
-    sum += w * tile / static_cast<double>(field.texel_count());
-    weights += w;
-  }
-  return sum / weights;
-}
-
-void fill_tiles(const std::vector<FieldView>& views, LightField& field, const EmitterBlender& emitters, int k,
-                const Progress& progress) {
-  tbb::enumerable_thread_specific<TileResampler> resamplers([&] { return TileResampler(views, field, emitters, k); });
-  std::mutex reporting;
-  std::size_t done = 0;
-  tbb::parallel_for(std::size_t{0}, field.directions.size(), [&](std::size_t i) {
-    resamplers.local().fill(i, field.tile(i));
-    const std::lock_guard lock(reporting);
-    report_progress(progress, "resampling", static_cast<double>(++done) / static_cast<double>(field.directions.size()));
-  });
-}
-
 }  // namespace
 
 std::optional<std::string> ResampleOptions::validate() const {
@@ -86,44 +64,177 @@ std::optional<std::string> ResampleOptions::validate() const {
   return std::nullopt;
 }
 
-FocusResult focus(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const ResampleOptions& options,
-                  const Progress& progress) {
+// ---- tiles on demand ----
+
+struct Resampling::Impl {
+  const std::vector<FieldView>& views;
+  int k = 0;
+  LightField field;
+  std::vector<SphereScore> sphere_scores;
+  double focusing_s = 0;
+  // The plane needs the one, every other proxy the other.
+  std::optional<RectifiedViews> rectified;
+  std::optional<EmitterBlender> emitters;
+  std::optional<tbb::enumerable_thread_specific<PlaneTiles>> plane_tiles;
+  std::optional<tbb::enumerable_thread_specific<TileResampler>> resamplers;
+};
+
+Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
+                       const ResampleOptions& options, const Progress& progress)
+    : impl_(new Impl{views, 0, {}, {}, 0, {}, {}, {}, {}}) {
   check(!options.validate().has_value(), "resample options are validated by the caller");
-  FocusResult result;
-  LightField& field = result.field;
+  const auto start = Clock::now();
+  report_progress(progress, "focusing", 0);
+  Impl& i = *impl_;
+  LightField& field = i.field;
   field.plane = rectangle;
   field.resolution = options.size;
   field.directions = geodesic_hemisphere(options.directions);
-  result.k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
-  report_progress(progress, "focusing", 0);
+  const int k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
+  i.k = k;
   const std::vector<Emitter> emitters = options.proxy == "plane" ? std::vector<Emitter>{} : find_emitters(views);
-  field.surroundings = choose_surroundings(views, rectangle, options.proxy, result.k, emitters, result.sphere_scores);
-  const EmitterBlender emitter_blender(views, field.surroundings, emitters, rectangle);
-  field.emitters = emitter_blender.emitters();
-  if (!field.surroundings.is_plane())
-    field.surroundings.panorama = make_panorama(views, field.surroundings, emitter_blender, panorama_width);
+  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, i.sphere_scores);
+  field.options_json = options_to_json(options, k, field.surroundings);
+  if (field.surroundings.is_plane()) {
+    i.rectified.emplace(views, rectangle, options.size);
+    i.plane_tiles.emplace([&i, k] { return PlaneTiles(*i.rectified, i.field, k); });
+  } else {
+    i.emitters.emplace(views, field.surroundings, emitters, rectangle);
+    field.emitters = i.emitters->emitters();
+    field.surroundings.panorama = make_panorama(views, field.surroundings, *i.emitters, panorama_width);
+    i.resamplers.emplace([&i, k] { return TileResampler(i.views, i.field, *i.emitters, k); });
+  }
   report_progress(progress, "focusing", 1);
-  field.options_json = options_to_json(options, result.k, field.surroundings);
+  i.focusing_s = seconds_since(start);
+}
+
+Resampling::~Resampling() = default;
+
+const LightField& Resampling::field() const {
+  return impl_->field;
+}
+int Resampling::k() const {
+  return impl_->k;
+}
+const std::vector<SphereScore>& Resampling::sphere_scores() const {
+  return impl_->sphere_scores;
+}
+double Resampling::focusing_s() const {
+  return impl_->focusing_s;
+}
+
+void Resampling::fill(std::size_t direction, Eigen::Vector4f* tile) {
+  if (impl_->plane_tiles)
+    impl_->plane_tiles->local().fill(direction, tile);
+  else
+    impl_->resamplers->local().fill(direction, tile);
+}
+
+// ---- all of them ----
+
+namespace {
+
+// A tile on its way: packed in any thread, stored in the order of directions.
+struct FinishedTile {
+  std::size_t direction = 0;
+  std::string packed;
+  double mean_confidence = 0;
+  double blending_s = 0;
+  double packing_s = 0;
+};
+
+double mean_confidence_of(const std::vector<Eigen::Vector4f>& tile) {
+  double sum = 0;
+  for (const Eigen::Vector4f& texel : tile) sum += static_cast<double>(texel.w());
+  return sum / static_cast<double>(tile.size());
+}
+
+// Pack: (direction, tile) → string. Store: (string) in the order of directions.
+template <typename Pack, typename Store>
+void make_tiles(Resampling& resampling, const Pack& pack, const Store& store, ResampleResult& result,
+                const Progress& progress) {
+  const DirectionSet& set = resampling.field().directions;
+  const std::size_t texels = resampling.field().texel_count();
+  const int threads = tbb::this_task_arena::max_concurrency();
+  const std::size_t tiles_at_hand = 8 * static_cast<std::size_t>(threads);  // a slow one does not hold up the others
+  double confidence = 0, weights = 0, blending_s = 0, packing_s = 0, storing_s = 0;
+  std::size_t next = 0;
+  tbb::parallel_pipeline(
+      tiles_at_hand,
+      tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, [&](tbb::flow_control& control) {
+        if (next == set.size()) control.stop();
+        return next == set.size() ? next : next++;
+      }) & tbb::make_filter<std::size_t, FinishedTile>(tbb::filter_mode::parallel, [&](std::size_t direction) {
+        thread_local std::vector<Eigen::Vector4f> tile;
+        tile.resize(texels);
+        FinishedTile finished{direction, {}, 0, 0, 0};
+        auto start = Clock::now();
+        resampling.fill(direction, tile.data());
+        finished.blending_s = seconds_since(start);
+        finished.mean_confidence = mean_confidence_of(tile);
+        start = Clock::now();
+        finished.packed = pack(direction, tile);
+        finished.packing_s = seconds_since(start);
+        return finished;
+      }) & tbb::make_filter<FinishedTile, void>(tbb::filter_mode::serial_in_order, [&](const FinishedTile& finished) {
+        const auto start = Clock::now();
+        store(finished.packed);
+        storing_s += seconds_since(start);
+        blending_s += finished.blending_s;
+        packing_s += finished.packing_s;
+        const std::size_t i = finished.direction;
+        const double w = static_cast<double>(set.solid_angles_sr[i] * set.directions[i].z());
+        confidence += w * finished.mean_confidence;
+        weights += w;
+        report_progress(progress, "resampling", static_cast<double>(i + 1) / static_cast<double>(set.size()));
+      }));
+  result.mean_confidence = confidence / weights;
+  result.seconds["blending"] = blending_s / threads;
+  result.seconds["packing"] = packing_s / threads;
+  result.seconds["writing"] = storing_s;
+}
+
+ResampleResult start_of_result(const Resampling& resampling, std::size_t views) {
+  ResampleResult result;
+  result.views = views;
+  result.field = resampling.field();
+  result.sphere_scores = resampling.sphere_scores();
+  result.seconds["focusing"] = resampling.focusing_s();
   return result;
 }
 
+}  // namespace
+
 ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
                         const ResampleOptions& options, const Progress& progress) {
-  auto start = Clock::now();
-  FocusResult focused = focus(views, rectangle, options, progress);
-  ResampleResult result;
-  result.views = views.size();
-  result.sphere_scores = std::move(focused.sphere_scores);
-  result.field = std::move(focused.field);
-  result.seconds["focusing"] = seconds_since(start);
-
-  start = Clock::now();
+  Resampling resampling(views, rectangle, options, progress);
+  ResampleResult result = start_of_result(resampling, views.size());
   LightField& field = result.field;
-  field.rgbc.assign(field.directions.size() * field.texel_count(), Eigen::Vector4f::Zero());
-  const EmitterBlender emitters(views, field.surroundings, field.emitters);
-  fill_tiles(views, field, emitters, focused.k, progress);
-  result.seconds["blending"] = seconds_since(start);
-  result.mean_confidence = mean_confidence(field);
+  field.rgbc.resize(field.directions.size() * field.texel_count());
+  const auto keep = [&](std::size_t direction, const std::vector<Eigen::Vector4f>& tile) {
+    std::copy(tile.begin(), tile.end(), field.tile(direction));
+    return std::string();
+  };
+  make_tiles(
+      resampling, keep, [](const std::string&) {}, result, progress);
+  return result;
+}
+
+ResampleResult resample_to_file(const std::filesystem::path& path, const std::vector<FieldView>& views,
+                                const PlaneRectangle& rectangle, const ResampleOptions& options, bool absolute,
+                                const Progress& progress) {
+  Resampling resampling(views, rectangle, options, progress);
+  ResampleResult result = start_of_result(resampling, views.size());
+  result.field.absolute = absolute;
+  LightFieldWriter writer(path, result.field);
+  const auto pack = [&](std::size_t, const std::vector<Eigen::Vector4f>& tile) {
+    return LightFieldWriter::pack(tile.data(), result.field.resolution);
+  };
+  make_tiles(
+      resampling, pack, [&](const std::string& packed) { writer.append(packed); }, result, progress);
+  const auto start = Clock::now();
+  writer.finish();
+  result.seconds["writing"] += seconds_since(start);
   return result;
 }
 

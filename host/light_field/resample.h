@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,26 +33,45 @@ struct ResampleOptions {
 struct ResampleResult {
   LightField field;
   std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
-  std::map<std::string, double> seconds;   // by stage
+  std::map<std::string, double> seconds;   // by stage; blending and packing: of all threads, over their number
   std::size_t views = 0;
   double mean_confidence = 0;  // cosine-weighted over directions, mean over the plane
 };
 
-// A light field but for its texels: what the views are focused on, and the emitters among it, are found.
-struct FocusResult {
-  LightField field;                        // no texels yet
-  int k = 0;                               // views blended for a ray
-  std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
-};
-// Preconditions as resample, of which this is the first half.
-[[nodiscard]] FocusResult focus(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                                const ResampleOptions&, const Progress&);
+// A capture that is focused and ready to be resampled (Ihrke et al. 2008, §4.3), each ray blended from the k best views
+// (Buehler et al. 2001, §4.1), seen over the proxy: see docs/light_field.md. Tiles are made on demand.
+class Resampling {
+ public:
+  // `views` see the world frame and outlive this; `rectangle` is the plane's part to cover.
+  Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const ResampleOptions&,
+             const Progress&);
+  ~Resampling();
+  Resampling(const Resampling&) = delete;
+  Resampling& operator=(const Resampling&) = delete;
 
-// The views resampled into L(p, ω) on a plane parallel to the ground (Ihrke et al. 2008, §4.3), each ray blended from
-// the k best views (Buehler et al. 2001, §4.1), seen over the proxy: see docs/light_field.md.
-// `views` see the world frame; `rectangle` is the plane's part to cover.
+  // Everything but the texels.
+  [[nodiscard]] const LightField& field() const;
+  [[nodiscard]] int k() const;  // views blended for a ray
+  // One direction's tile, resolution² texels. In any thread, in any order: the result is the same.
+  void fill(std::size_t direction, Eigen::Vector4f* tile);
+
+  [[nodiscard]] const std::vector<SphereScore>& sphere_scores() const;
+  [[nodiscard]] double focusing_s() const;  // how long the construction took
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// All tiles, in memory: 16 bytes a texel and direction.
 [[nodiscard]] ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
                                       const ResampleOptions&, const Progress&);
+
+// All tiles, written to a file as they are made; the result's field has no texels. `absolute`: radiance is in the units
+// of the reference reading.
+[[nodiscard]] ResampleResult resample_to_file(const std::filesystem::path&, const std::vector<FieldView>& views,
+                                              const PlaneRectangle& rectangle, const ResampleOptions&, bool absolute,
+                                              const Progress&);
 
 // The rectangle of the plane z = height (world) that the mirrors' openings cover: the box around all points that at
 // least a tenth as many views pass as the best-covered point. Nothing when no view's rays come down to the plane.

@@ -33,7 +33,9 @@ class JustInTime : public testing::Test {
     options.directions = 700;
     options.size = 32;
     options.proxy = "sphere:1.2";
-    focused_ = new FocusResult(focus(*views_, square, options, {}));
+    const Resampling focused(*views_, square, options, {});
+    focused_ = new LightField(focused.field());
+    k_ = focused.k();
     whole_ = new LightField(resample(*views_, square, options, {}).field);
   }
   static void TearDownTestSuite() {
@@ -43,7 +45,7 @@ class JustInTime : public testing::Test {
   }
 
   static std::vector<PlaneTile> tiles(const std::vector<TileRequest>& requests, int most_texels) {
-    return resample_just_in_time(*views_, focused_->field, focused_->k, requests, {most_texels});
+    return resample_just_in_time(*views_, *focused_, k_, requests, {most_texels});
   }
 
   // Light of all requests at p: Σ tile(p) · solid angle of its cells.
@@ -57,11 +59,13 @@ class JustInTime : public testing::Test {
   }
 
   static std::vector<FieldView>* views_;
-  static FocusResult* focused_;
+  static LightField* focused_;  // no texels
+  static int k_;
   static LightField* whole_;
 };
 std::vector<FieldView>* JustInTime::views_ = nullptr;
-FocusResult* JustInTime::focused_ = nullptr;
+LightField* JustInTime::focused_ = nullptr;
+int JustInTime::k_ = 0;
 LightField* JustInTime::whole_ = nullptr;
 
 // Runs of seven cells each, over the given part of the plane.
