@@ -98,7 +98,7 @@ void create_output_folder(const ProcessArguments& a) {
 
 void run(const ProcessArguments& a) {
   check_options(a);
-  const SessionReader session(a.session);
+  const SessionReader session = open_session(a.session);
   create_output_folder(a);
   const Progress progress = progress_bar();
   std::map<std::string, double> seconds;

@@ -18,6 +18,12 @@ namespace {
 
 }  // namespace
 
+SessionReader open_session(const std::filesystem::path& folder) {
+  SessionReader session(folder);
+  for (const std::string& line : session.damage()) fmt::print(stderr, "warning: {}\n", line);
+  return session;
+}
+
 ResponseCurve response_of(const SessionReader& session) {
   const std::filesystem::path file = session.folder() / "response.json";
   if (std::filesystem::exists(file)) return read_response_curve(file);
