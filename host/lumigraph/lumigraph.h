@@ -32,9 +32,13 @@ struct LumigraphOptions {
   [[nodiscard]] std::optional<std::string> validate() const;
 };
 
+// What a pixel rests on. A guess is a point of the proxy that lies in a photo's picture, but hidden or at a silhouette
+// in each: it has that photo's colour at the place.
+enum Covered : std::uint8_t { nothing = 0, guessed = 127, seen = 255 };
+
 struct LumigraphPicture {
   Picture picture;  // black where nothing is covered; the blending field is 8-bit always
-  ImageU8 covered;  // 255 where the proxy is and a photo shows it, else 0
+  ImageU8 covered;  // see Covered
 };
 
 // New views of a place from posed photos and a rough idea of its shape: unstructured lumigraph rendering (Buehler,

@@ -61,7 +61,7 @@ TileRenderer::TileRenderer(const TileFrame& frame, TakeChosen take)
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   least_penalty_.resize(entries);
   least_candidate_.resize(entries);
-  for (auto* values : {&weight_, &x_, &y_, &lod_}) values->resize(entries);
+  for (auto* values : {&weight_, &sight_, &x_, &y_, &lod_}) values->resize(entries);
   view_.resize(entries);
   pixel_.resize(largest_bundle);
 }
@@ -158,11 +158,11 @@ void TileRenderer::rank(const RayBundle& bundle, const std::vector<std::uint32_t
   const std::size_t count = bundle.dx.size();
   const LeastPenalties least{least_penalty_, least_candidate_, count, frame_.options.penalty.k};
   clear(least);
-  for (auto* values : {&answers_x_, &answers_y_, &answers_lod_, &answers_penalty_})
+  for (auto* values : {&answers_x_, &answers_y_, &answers_lod_, &answers_weight_, &answers_penalty_})
     if (values->size() < views.size() * count) values->resize(views.size() * count);
   for (std::size_t c = 0; c < views.size(); ++c) {
     const auto row = [&](std::vector<float>& values) { return std::span(values).subspan(c * count, count); };
-    const RayAnswers answers{row(answers_x_), row(answers_y_), row(answers_lod_), row(answers_penalty_)};
+    const RayAnswers answers{row(answers_x_), row(answers_y_), row(answers_lod_), row(answers_weight_), row(answers_penalty_)};
     answer(frame_.views[views[c]], bundle, frame_.options.penalty, frame_.depth_tolerance, answers);
     add_candidate(least, static_cast<std::int32_t>(c), answers.penalty);
   }
@@ -190,6 +190,7 @@ void TileRenderer::hand_on(const Rays&, const Region& region, const Candidates& 
   for (std::size_t i = 0; i < count; ++i) {
     const float threshold = least_penalty_[k * count + i];
     float sum = 0;
+    sight_[i] = 0;
     for (std::size_t row = 0; row < k; ++row) {
       const std::size_t at = row * count + i;
       const std::int32_t candidate = least_candidate_[at];
@@ -201,11 +202,12 @@ void TileRenderer::hand_on(const Rays&, const Region& region, const Candidates& 
       x_[at] = answers_x_[answer_at];
       y_[at] = answers_y_[answer_at];
       lod_[at] = answers_lod_[answer_at];
+      sight_[i] = std::max(sight_[i], answers_weight_[answer_at]);
     }
     if (sum > 0)
       for (std::size_t row = 0; row < k; ++row) weight_[row * count + i] /= sum;
   }
-  take_({std::span(pixel_).first(count), count, frame_.options.penalty.k, weight_, view_, x_, y_, lod_});
+  take_({std::span(pixel_).first(count), count, frame_.options.penalty.k, weight_, sight_, view_, x_, y_, lod_});
 }
 
 }  // namespace mf

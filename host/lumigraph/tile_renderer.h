@@ -27,7 +27,8 @@ struct ChosenViews {
   std::span<const std::int32_t> pixel;  // the ray's pixel, its index in the picture; −1: not this one
   std::size_t row_length = 0;           // ≥ pixel.size()
   int k = 0;
-  std::span<const float> weight;        // sums to 1 over the k, or is 0 in all: no photo shows the point
+  std::span<const float> weight;        // sums to 1 over the k, or is 0 in all: the point is in no photo's picture
+  std::span<const float> sight;         // of each ray alone, 0…1: how well the photo that shows it best shows it
   std::span<const std::uint32_t> view;  // the rest is meaningless where the weight is 0
   std::span<const float> x, y, lod;     // where the photo shows the point, photo pixels, and how finely: see RayAnswers
 };
@@ -81,11 +82,11 @@ class TileRenderer {
   Rays rays_;                    // of the tile, block by block
   std::vector<Region> blocks_;   // of the rays
   std::vector<Candidates> levels_;  // of the block, of the tile, all
-  std::vector<float> answers_x_, answers_y_, answers_lod_, answers_penalty_;  // a row a candidate
+  std::vector<float> answers_x_, answers_y_, answers_lod_, answers_weight_, answers_penalty_;  // a row a candidate
   std::vector<float> least_penalty_;
   std::vector<std::int32_t> least_candidate_;
   std::vector<std::int32_t> pixel_;
-  std::vector<float> weight_, x_, y_, lod_;
+  std::vector<float> weight_, sight_, x_, y_, lod_;
   std::vector<std::uint32_t> view_;
 };
 
