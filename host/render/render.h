@@ -9,7 +9,7 @@
 #include "host/light_field/light_field.h"
 #include "host/render/ground.h"
 #include "host/render/illuminator.h"
-#include "host/render/view.h"
+#include "host/io/view.h"
 
 namespace mf {
 

@@ -27,7 +27,7 @@ const Names stage_libraries = vocabulary + Names{"TBB"};
 // The plain structs that stages hand forward.
 const Names records{"host/calibration/calibration.h", "host/light_field/light_field.h",
                     "host/light_field/direction_set.h"};
-const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/"};
+const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/"};
 
 bool starts_with_any(std::string_view text, const Names& beginnings) {
   return std::any_of(beginnings.begin(), beginnings.end(), [&](std::string_view b) { return text.starts_with(b); });
@@ -86,6 +86,7 @@ const std::vector<Library>& known_libraries() {
       {"ISA-L", {"isa-l"}},
       {"PNG", {"png.h"}},
       {"zlib", {"zlib.h"}},
+      {"JPEG", {"jpeglib.h", "jerror.h"}},
       {"OpenEXR", {"OpenEXR/", "Imf", "Iex", "IlmThread"}},
       {"Imath", {"Imath/", "Imath", "half.h"}},
       {"AprilTag", {"apriltag/", "apriltag", "tag36h11.h"}},
@@ -126,17 +127,19 @@ const std::vector<FolderRule>& include_table() {
       {"hw-sim/",
        {"common/", "device/"},
        vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev", "usbfs"}},
-      {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
+      {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "JPEG", "TIFF", "assimp"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
       {"host/photometry/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/calibration/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/blending/", {"common/"}, stage_libraries},
+      {"host/tracing/", {"common/", "host/io/"}, stage_libraries + Names{"Embree"}},
       {"host/light_field/", stage_headers + Names{"host/calibration/calibration.h"},
        stage_libraries + Names{"OpenEXR", "Imath", "SIMD"}},
-      {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree", "assimp"}},
+      {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree"}},
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
+      {"host/lumigraph/", stage_headers, stage_libraries + Names{"GL", "Embree"}},
       {"host/report/", stage_headers + records, stage_libraries},
       // It shows what two stages give, and lets a hand ask them for more.
       {"host/viewer/",

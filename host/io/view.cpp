@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/render/view.h"
+#include "host/io/view.h"
 
 #include <fmt/format.h>
 
