@@ -2,16 +2,21 @@
 #include <fmt/format.h>
 
 #include "common/error.h"
+#include "common/session.h"
 #include "host/cli/command.h"
+#include "host/cli/session_files.h"
+#include "host/light_field/resample.h"
 #include "host/viewer/layout.h"
 #include "host/viewer/light_field_window.h"
+#include "host/viewer/session_window.h"
 
 namespace mf {
 
 namespace {
 
 struct ViewArguments {
-  std::filesystem::path field;
+  std::filesystem::path shown;
+  double height_m = 0;
   std::vector<int> size{1280, 800};
   std::filesystem::path screenshots = ".";
 };
@@ -23,17 +28,47 @@ std::string describe_field(const std::filesystem::path& file, const LightField& 
                      surroundings_name(field.surroundings));
 }
 
+Window open_window(const ViewArguments& a, const std::string& what) {
+  Window window("mirrorfield: " + what, a.size[0], a.size[1]);
+  window.keep_screenshots_in(a.screenshots);
+  return window;
+}
+
+void view_light_field(const ViewArguments& a) {
+  LightField field = read_light_field(a.shown);
+  const std::string title = describe_field(a.shown, field);
+  Window window = open_window(a, a.shown.string());
+  show_light_field(window, std::move(field), title);
+}
+
+void view_session(const ViewArguments& a) {
+  const SessionReader session(a.shown);
+  const Calibration calibration = calibration_of(session);
+  const std::string file = (session.folder() / "calibration.json").string();
+  if (!calibration.cam_from_world)
+    throw InputError(file, "cam_from_world", "is missing: record world tags with the session and calibrate again");
+  const auto plane = covered_rectangle(calibration, session.header().target, a.height_m);
+  if (!plane)
+    throw InputError(file, "frames",
+                     fmt::format("no used frame caught light at height {} m: give another --height", a.height_m));
+  SessionView view(caught_rays(calibration, session.header().target), *plane);
+  const Eigen::Vector2d size = plane->size_m();
+  const std::string title = fmt::format("{}: {} frames over {:.2f} × {:.2f} m at height {} m", a.shown.string(),
+                                        view.frames(), size.x(), size.y(), a.height_m);
+  Window window = open_window(a, a.shown.string());
+  show_session(window, std::move(view), title);
+}
+
 void run(const ViewArguments& a) {
   if (a.size[0] < smallest_window_width_px || a.size[1] < smallest_window_height_px || a.size[0] > 16384 ||
       a.size[1] > 16384)
     throw InputError("view", "--size",
                      fmt::format("must be a width from {} and a height from {} to 16384 pixels",
                                  smallest_window_width_px, smallest_window_height_px));
-  LightField field = read_light_field(a.field);
-  const std::string title = describe_field(a.field, field);
-  Window window("mirrorfield: " + a.field.string(), a.size[0], a.size[1]);
-  window.keep_screenshots_in(a.screenshots);
-  show_light_field(window, std::move(field), title);
+  if (std::filesystem::is_directory(a.shown))
+    view_session(a);
+  else
+    view_light_field(a);
 }
 
 }  // namespace
@@ -41,7 +76,8 @@ void run(const ViewArguments& a) {
 void add_view_command(CommandLine& program) {
   CommandLine command = program.command("view", "look into a light field, or from between posed photos, in a window");
   const auto a = std::make_shared<ViewArguments>();  // shared: the parser's callback outlives this function
-  command.option("field", a->field, "light field (.lf.exr)", Presence::required);
+  command.option("shown", a->shown, "light field (.lf.exr), or a session's folder", Presence::required);
+  command.option("--height", a->height_m, "session: of the plane above the world's ground, metres");
   command.values("--size", 2, a->size, "width and height of the window, pixels (1280 800)");
   command.option("--screenshots", a->screenshots, "folder into which F12 writes view_0001.png, …");
   command.on_run([a] { run(*a); });

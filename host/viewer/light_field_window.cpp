@@ -4,9 +4,11 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "host/io/image_file.h"
+#include "host/viewer/drawing.h"
 
 namespace mf {
 
@@ -33,25 +35,16 @@ class LightFieldWindow {
   }
 
  private:
-  // A drag that starts on the plane's picture may leave it: the point then follows along the rectangle's edge.
   void drag_probe() {
-    const auto pointer = window_.pointer();
-    if (pointer && layout_.plane.holds(*pointer) && ImGui::IsMouseClicked(ImGuiMouseButton_Left)) dragging_ = true;
-    if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_ = false;
-    if (!pointer || !dragging_) return;
+    const auto position = drag_.position(window_, layout_.plane);
+    if (!position) return;
     const Eigen::Vector2d before = view_.probe_in_plane();
-    view_.move_probe(view_.plane_point(layout_.plane.position_of(*pointer)));
-    probe_moved_ = probe_moved_ || view_.probe_in_plane() != before;
+    view_.move_probe(view_.plane_point(*position));
+    probe_moved_ = view_.probe_in_plane() != before;
   }
 
   void draw_panel() {
-    ImGui::SetNextWindowPos({0, 0});
-    ImGui::SetNextWindowSize({static_cast<float>(panel_width_px), static_cast<float>(window_.height())});
-    ImGui::Begin("light field", nullptr,
-                 ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove);
-    ImGui::PushTextWrapPos();
-    ImGui::TextUnformatted(title_.c_str());
-    ImGui::Separator();
+    const Panel panel(window_, "Drag on the plane: the probe point");
     if (ImGui::SliderFloat("exposure", &stops_, -8, 8, "%+.1f stops")) exposure_moved_ = true;
     auto height = static_cast<float>(view_.height_m());
     if (ImGui::SliderFloat("height", &height, 0, 0.5F, "%.2f m")) {
@@ -62,14 +55,11 @@ class LightFieldWindow {
         ImGui::SliderFloat("white at", &nearest_m_, 0.1F, 10, "%.2f m", ImGuiSliderFlags_Logarithmic))
       exposure_moved_ = true;
     ImGui::Separator();
+    ImGui::TextUnformatted(title_.c_str());
+    ImGui::Separator();
     describe_probe();
     ImGui::Separator();
     ImGui::TextUnformatted(reading().c_str());
-    ImGui::Separator();
-    ImGui::TextUnformatted("Drag on the plane: the probe point\nF12: screenshot    Ctrl+Q: close");
-    ImGui::TextUnformatted(window_.notice().c_str());
-    ImGui::PopTextWrapPos();
-    ImGui::End();
   }
 
   void describe_probe() const {
@@ -104,11 +94,11 @@ class LightFieldWindow {
     hemisphere_.draw(layout_.hemisphere);
     if (!view_.field().surroundings.is_plane()) distances_.draw(layout_.distances);
     panorama_.draw(layout_.panorama);
-    caption(layout_.plane, "irradiance of the plane");
-    caption(layout_.hemisphere, "light at the probe point, by direction");
-    caption(layout_.distances, view_.field().surroundings.is_plane() ? "focused on the plane: no distances"
-                                                                     : "nearness of the surroundings");
-    caption(layout_.panorama, "the probe: +Y in the middle, zenith at the top");
+    draw_caption(layout_.plane, "irradiance of the plane");
+    draw_caption(layout_.hemisphere, "light at the probe point, by direction");
+    draw_caption(layout_.distances, view_.field().surroundings.is_plane() ? "focused on the plane: no distances"
+                                                                          : "nearness of the surroundings");
+    draw_caption(layout_.panorama, "the probe: +Y in the middle, zenith at the top");
     draw_cross(layout_.plane.pixel_of(view_.plane_position(view_.probe_in_plane())));
   }
 
@@ -125,29 +115,13 @@ class LightFieldWindow {
             show_inverse_distances(view_.inverse_distances(layout_.distances.width), static_cast<double>(nearest_m_)));
       panorama_waits_ = true;
     }
-    if (panorama_waits_ && !dragging_ && !ImGui::IsAnyItemActive()) {
+    if (panorama_waits_ && !drag_.is_dragged() && !ImGui::IsAnyItemActive()) {
       panorama_.set(to_srgb8(view_.panorama(panorama_width_px), radiance_exposure_ * gain));
       panorama_waits_ = false;
     } else if (panorama_waits_) {
       window_.hurry();
     }
     first_ = probe_moved_ = exposure_moved_ = false;
-  }
-
-  static void caption(const Box& picture, const std::string& text) {
-    constexpr int text_height_px = 18;
-    draw_caption({picture.x, picture.y - text_height_px}, text);
-  }
-
-  static void draw_cross(const Eigen::Vector2d& at) {
-    constexpr float arm = 9, gap = 3;
-    const auto x = static_cast<float>(at.x()), y = static_cast<float>(at.y());
-    ImDrawList& list = *ImGui::GetBackgroundDrawList();
-    for (const auto& [colour, width] : {std::pair{IM_COL32(0, 0, 0, 255), 3.0F}, {IM_COL32(255, 220, 0, 255), 1.0F}})
-      for (const float sign : {-1.0F, 1.0F}) {
-        list.AddLine({x + sign * gap, y}, {x + sign * arm, y}, colour, width);
-        list.AddLine({x, y + sign * gap}, {x, y + sign * arm}, colour, width);
-      }
   }
 
   static constexpr int panorama_width_px = 512;
@@ -159,9 +133,10 @@ class LightFieldWindow {
   float stops_ = 0;
   float nearest_m_ = 0.5F;
   LightFieldLayout layout_;
+  DraggedPoint drag_;
   ShownPicture plane_, hemisphere_, distances_, panorama_;
   int hemisphere_size_ = 0;
-  bool first_ = true, dragging_ = false, probe_moved_ = false, exposure_moved_ = false, panorama_waits_ = true;
+  bool first_ = true, probe_moved_ = false, exposure_moved_ = false, panorama_waits_ = true;
 };
 
 }  // namespace

@@ -13,13 +13,14 @@
 
 namespace mf {
 
-// The rays that one frame caught: through the virtual centre, within the mirror's opening. World frame.
+// The rays that one frame caught: from the virtual centre through the mirror's opening. World frame.
 struct CaughtRays {
   Eigen::Vector3d centre;
   std::array<Eigen::Vector3d, 4> opening;  // corners, in order
 
-  // The ray through p was caught: p lies within the pyramid, or on the far side of the centre within its mirror image.
-  [[nodiscard]] bool pass(const Eigen::Vector3d& p) const;
+  // Of the caught ray whose line passes p, before the mirror or behind it: its direction, unit length, towards the
+  // light (away from the centre). Nothing when that line misses the opening.
+  [[nodiscard]] std::optional<Eigen::Vector3d> ray_through(const Eigen::Vector3d& p) const;
 };
 
 // Of every used frame whose mirror is seen from its front. Precondition: the calibration has a world frame.
@@ -36,10 +37,10 @@ class SessionView {
   // How many frames caught a ray through each cell, one channel, row 0 at max y.
   [[nodiscard]] ImageF counts(int width_px, int height_px) const;
 
-  // A direction from which a frame caught light at a point.
+  // A direction of the upper hemisphere from which a frame caught light at a point.
   struct Seen {
-    std::size_t frame = 0;
-    Eigen::Vector3d direction_in_plane;  // unit, towards the light: from the virtual centre to the point, reversed
+    std::size_t frame = 0;               // index in the rays
+    Eigen::Vector3d direction_in_plane;  // unit, towards the light
   };
   [[nodiscard]] std::vector<Seen> seen_at(const Eigen::Vector2d& p_in_plane) const;
 

@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/check.h"
 #include "common/error.h"
 #include "host/io/image_file.h"
+#include "host/viewer/layout.h"
 
 namespace mf {
 
@@ -116,6 +116,7 @@ struct Window::Handles {
 Window::Window(const std::string& title, int width_px, int height_px)
     : handles_(std::make_unique<Handles>(title, width_px, height_px)) {}
 
+Window::Window(Window&&) noexcept = default;
 Window::~Window() = default;
 
 bool Window::begin_frame() {
@@ -181,38 +182,6 @@ void Window::write_screenshot() {
   } catch (const InputError& e) {  // the window stays: the user may look on, and sees why
     notice_ = e.what();
   }
-}
-
-void ShownPicture::set(const ImageU8& picture) {
-  check(!picture.empty() && (picture.channels == 1 || picture.channels == 3), "a grey or RGB picture");
-  if (texture_.name() == 0) {
-    texture_ = make_texture();
-    glBindTexture(GL_TEXTURE_2D, texture_.name());
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
-  }
-  glBindTexture(GL_TEXTURE_2D, texture_.name());
-  const bool grey = picture.channels == 1;
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_G, grey ? GL_RED : GL_GREEN);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_B, grey ? GL_RED : GL_BLUE);
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTexImage2D(GL_TEXTURE_2D, 0, grey ? GL_R8 : GL_RGB8, picture.width, picture.height, 0, grey ? GL_RED : GL_RGB,
-               GL_UNSIGNED_BYTE, picture.data.data());
-}
-
-void ShownPicture::draw(const Box& box) const {
-  if (texture_.name() == 0) return;
-  const auto id = reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(texture_.name()));
-  const ImVec2 corner(static_cast<float>(box.x), static_cast<float>(box.y));
-  ImGui::GetBackgroundDrawList()->AddImage(
-      id, corner, {corner.x + static_cast<float>(box.width), corner.y + static_cast<float>(box.height)});
-}
-
-void draw_caption(const Eigen::Vector2d& pixel, const std::string& text) {
-  ImGui::GetBackgroundDrawList()->AddText({static_cast<float>(pixel.x()), static_cast<float>(pixel.y())},
-                                          ImGui::GetColorU32(ImGuiCol_Text), text.c_str());
 }
 
 }  // namespace mf

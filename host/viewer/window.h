@@ -8,8 +8,6 @@
 #include <string>
 
 #include "common/image.h"
-#include "host/gl/gl_objects.h"
-#include "host/viewer/layout.h"
 
 namespace mf {
 
@@ -17,7 +15,7 @@ namespace mf {
 //
 //   Window window("name", 1280, 800);
 //   while (window.begin_frame()) {
-//     … ImGui calls, show() …
+//     … panels and pictures (drawing.h) …
 //     window.end_frame();
 //   }
 //
@@ -26,8 +24,8 @@ class Window {
  public:
   // Throws InputError naming the display when there is none, or no OpenGL 3.3 on it.
   Window(const std::string& title, int width_px, int height_px);
-  Window(const Window&) = delete;
-  Window& operator=(const Window&) = delete;
+  Window(Window&&) noexcept;
+  Window& operator=(Window&&) = delete;
   ~Window();
 
   // Waits for something to happen, 0.1 s at most (not at all when the last frame said `hurry`). False: it was closed.
@@ -62,20 +60,5 @@ class Window {
   std::filesystem::path screenshot_folder_ = ".";
   std::string notice_;
 };
-
-// A picture on the graphics side, drawn behind the panels.
-class ShownPicture {
- public:
-  // 8 bits, 1 or 3 channels, not empty; its first row is shown at the top. Replaces what was there.
-  void set(const ImageU8&);
-  // Into the box; nothing before the first set(). Pixels that are larger than the screen's stay sharp.
-  void draw(const Box&) const;
-
- private:
-  GlTexture texture_;
-};
-
-// Text behind the panels, its upper left corner at `pixel`.
-void draw_caption(const Eigen::Vector2d& pixel, const std::string& text);
 
 }  // namespace mf
