@@ -19,6 +19,7 @@ void add_plate_command(CommandLine& program);
 void add_probe_command(CommandLine& program);
 void add_render_command(CommandLine& program);
 void add_composite_command(CommandLine& program);
+void add_lumigraph_command(CommandLine& program);
 void add_process_command(CommandLine& program);
 void add_view_command(CommandLine& program);
 

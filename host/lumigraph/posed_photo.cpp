@@ -9,6 +9,7 @@
 
 #include "common/check.h"
 #include "common/error.h"
+#include "host/lumigraph/area_average.h"
 
 namespace mf {
 
@@ -44,49 +45,6 @@ void check_photo(const PosedPhoto& photo, const std::string& source) {
   }
 }
 
-// Pixels of the source that a target pixel covers along one axis, and how much each counts: the lengths of overlap.
-struct Overlap {
-  int first = 0;
-  std::vector<float> weights;
-};
-
-std::vector<Overlap> overlaps(int source, int target) {
-  std::vector<Overlap> all(static_cast<std::size_t>(target));
-  const double step = static_cast<double>(source) / target;
-  for (int i = 0; i < target; ++i) {
-    const double low = i * step;
-    const double high = std::min<double>(source, (i + 1) * step);
-    Overlap& o = all[static_cast<std::size_t>(i)];
-    o.first = static_cast<int>(low);
-    for (int j = o.first; j < source && j < high; ++j)
-      o.weights.push_back(static_cast<float>((std::min(high, j + 1.0) - std::max<double>(low, j)) / (high - low)));
-  }
-  return all;
-}
-
-template <typename T>
-Image<T> averaged(const Image<T>& image, int width, int height) {
-  const std::vector<Overlap> columns = overlaps(image.width, width);
-  const std::vector<Overlap> rows = overlaps(image.height, height);
-  Image<T> out(width, height, image.channels);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      for (int c = 0; c < image.channels; ++c) {
-        const Overlap& column = columns[static_cast<std::size_t>(x)];
-        const Overlap& row = rows[static_cast<std::size_t>(y)];
-        float sum = 0;
-        for (std::size_t j = 0; j < row.weights.size(); ++j)
-          for (std::size_t i = 0; i < column.weights.size(); ++i)
-            sum += row.weights[j] * column.weights[i] *
-                   static_cast<float>(image.at(column.first + static_cast<int>(i), row.first + static_cast<int>(j), c));
-        if constexpr (std::is_integral_v<T>)
-          out.at(x, y, c) = static_cast<T>(std::lround(sum));
-        else
-          out.at(x, y, c) = sum;
-      }
-  return out;
-}
-
 }  // namespace
 
 void check_photos(const PhotoSet& set) {
@@ -108,8 +66,8 @@ PhotoSet scaled(PhotoSet set, double scale) {
   for (PosedPhoto& photo : set.photos) {
     const int width = std::max(2, static_cast<int>(std::lround(photo.camera.width * scale)));
     const int height = std::max(2, static_cast<int>(std::lround(photo.camera.height * scale)));
-    std::visit([&](auto& image) { image = averaged(image, width, height); }, photo.picture);
-    if (!photo.mask.empty()) photo.mask = averaged(photo.mask, width, height);
+    std::visit([&](auto& image) { image = area_average(image, width, height); }, photo.picture);
+    if (!photo.mask.empty()) photo.mask = area_average(photo.mask, width, height);
     auto& p = photo.camera.parameters;
     for (const std::size_t i : {0U, 2U}) p[i] *= static_cast<double>(width) / photo.camera.width;
     for (const std::size_t i : {1U, 3U}) p[i] *= static_cast<double>(height) / photo.camera.height;

@@ -22,7 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float no_end = std::numeric_limits<float>::infinity();
+
+
 
 std::vector<double> numbers_in(const std::string& name, std::string_view text) {
   std::vector<double> numbers;
@@ -72,12 +74,13 @@ Eigen::Vector3d convergence(const PhotoSet& set, const MeanSight& sight) {
   // Parallel axes leave the distance open: the least eigenvalue, n · (mean square sine to the common direction), is then
   // that of a jitter of 0.3°.
   const double along = sight.direction.dot(a * sight.direction) / static_cast<double>(set.photos.size());
-  const auto x = solve_symmetric(a, b);
-  if (!(along > 3e-5) || !x || !((*x - sight.centre).dot(sight.direction) > 0))
+  const auto solution = solve_symmetric(a, b);
+  const Eigen::Vector3d x = solution ? Eigen::Vector3d(*solution) : sight.centre;
+  if (!(along > 3e-5) || !((x - sight.centre).dot(sight.direction) > 0))
     throw InputError(set.source, "--proxy plane",
                      "needs a distance: the set has no points (points3D.txt), and the optical axes do not converge "
                      "before the cameras: give plane:D");
-  return *x;
+  return x;
 }
 
 PlaneProxy facing_plane(const MeanSight& sight, double distance) {
@@ -145,16 +148,17 @@ Proxy make_tunnel(const std::string& name, const std::vector<double>& numbers, c
   Eigen::Vector3d down = Eigen::Vector3d::Zero();
   for (const PosedPhoto& photo : set.photos) down += photo.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
   Eigen::Matrix3d box_from_world;
-  box_from_world.row(2) = sight.direction;
-  box_from_world.row(0) = down.cross(sight.direction).normalized();
-  box_from_world.row(1) = box_from_world.row(2).cross(box_from_world.row(0));
+  box_from_world.row(2) = sight.direction.transpose();
+  const Eigen::Vector3d across = down.cross(sight.direction).normalized();
+  box_from_world.row(0) = across.transpose();
+  box_from_world.row(1) = sight.direction.cross(across).transpose();
   BoxProxy box;
   box.box_from_world.rotation = Eigen::Quaterniond(box_from_world);
   box.box_from_world.translation = -(box_from_world * sight.centre);
   const auto half_width = static_cast<float>(numbers[0] / 2);
   const auto half_height = static_cast<float>(numbers[1] / 2);
-  box.low = {-half_width, -half_height, -infinite};
-  box.high = {half_width, half_height, numbers.size() == 3 ? static_cast<float>(numbers[2]) : infinite};
+  box.low = {-half_width, -half_height, -no_end};
+  box.high = {half_width, half_height, numbers.size() == 3 ? static_cast<float>(numbers[2]) : no_end};
   return box;
 }
 

@@ -10,14 +10,14 @@ namespace mf {
 
 namespace {
 
-constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float no_hit = std::numeric_limits<float>::infinity();
 
 void trace_surface(const PlaneProxy& plane, const ProxyRays& rays) {
   const float height = plane.offset - plane.normal.dot(rays.origin);
   for (std::size_t i = 0; i < rays.dx.size(); ++i) {
     const float along = plane.normal.x() * rays.dx[i] + plane.normal.y() * rays.dy[i] + plane.normal.z() * rays.dz[i];
     const float distance = height / along;
-    rays.distance[i] = distance > 0 ? distance : infinite;
+    rays.distance[i] = distance > 0 ? distance : no_hit;
     rays.nx[i] = plane.normal.x();
     rays.ny[i] = plane.normal.y();
     rays.nz[i] = plane.normal.z();
@@ -34,7 +34,7 @@ void trace_surface(const SphereProxy& sphere, const ProxyRays& rays) {
     const float b = o.dot(d);
     const float discriminant = b * b - a * c;
     const float distance = discriminant >= 0 ? (-b + std::sqrt(discriminant)) / a : -1;
-    rays.distance[i] = distance > 0 ? distance : infinite;
+    rays.distance[i] = distance > 0 ? distance : no_hit;
     const Eigen::Vector3f n = distance > 0 ? Eigen::Vector3f((o + distance * d) / sphere.radius) : Eigen::Vector3f::UnitZ();
     rays.nx[i] = n.x();
     rays.ny[i] = n.y();
@@ -49,7 +49,7 @@ void trace_surface(const BoxProxy& box, const ProxyRays& rays) {
   for (std::size_t i = 0; i < rays.dx.size(); ++i) {
     const Eigen::Vector3f d = rotation * Eigen::Vector3f(rays.dx[i], rays.dy[i], rays.dz[i]);
     float enter = 0;
-    float leave = infinite;
+    float leave = no_hit;
     int wall = 2;
     for (int axis = 0; axis < 3; ++axis) {
       if (d[axis] == 0) continue;
@@ -61,7 +61,7 @@ void trace_surface(const BoxProxy& box, const ProxyRays& rays) {
         wall = axis;
       }
     }
-    rays.distance[i] = leave > enter ? leave : infinite;
+    rays.distance[i] = leave > enter ? leave : no_hit;
     rays.nx[i] = rotation(wall, 0);
     rays.ny[i] = rotation(wall, 1);
     rays.nz[i] = rotation(wall, 2);
@@ -91,7 +91,7 @@ void trace_packet(const MeshProxy& proxy, const ProxyRays& rays, std::size_t fir
     hit.ray.dir_y[i] = rays.dy[at];
     hit.ray.dir_z[i] = rays.dz[at];
     hit.ray.tnear[i] = 0;
-    hit.ray.tfar[i] = infinite;
+    hit.ray.tfar[i] = no_hit;
     hit.ray.time[i] = 0;
     hit.ray.mask[i] = ~0U;
     hit.ray.flags[i] = 0;
@@ -102,7 +102,7 @@ void trace_packet(const MeshProxy& proxy, const ProxyRays& rays, std::size_t fir
     const bool met = hit.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     const Eigen::Vector3f n = met ? shading_normal(proxy.mesh, hit.hit.primID[i], hit.hit.u[i], hit.hit.v[i])
                                   : Eigen::Vector3f::UnitZ();
-    rays.distance[first + i] = met ? hit.ray.tfar[i] : infinite;
+    rays.distance[first + i] = met ? hit.ray.tfar[i] : no_hit;
     rays.nx[first + i] = n.x();
     rays.ny[first + i] = n.y();
     rays.nz[first + i] = n.z();

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/lumigraph/lumigraph.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "common/error.h"
+#include "host/cli/command.h"
+#include "host/io/image_file.h"
+#include "host/lumigraph/leave_one_out.h"
+#include "host/lumigraph/picture_file.h"
+#include "host/lumigraph/read_photos.h"
+
+namespace mf {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct LumigraphArguments {
+  fs::path colmap;
+  fs::path transforms;
+  std::string proxy = "plane";
+  fs::path camera_path;
+  fs::path output;
+  bool leave_one_out = false;
+  bool json = false;
+  double scale = 1;
+  int k = LumigraphOptions{}.penalty.k;
+  double angle = LumigraphOptions{}.penalty.angle;
+  double resolution = LumigraphOptions{}.penalty.resolution;
+  double gamma = LumigraphOptions{}.penalty.border;
+  double border = LumigraphOptions{}.border;
+  double tolerance = VisibilityOptions{}.tolerance;
+  double silhouette = VisibilityOptions{}.silhouette;
+};
+
+LumigraphOptions options_of(const LumigraphArguments& a) {
+  LumigraphOptions options;
+  options.penalty = {a.k, static_cast<float>(a.angle), static_cast<float>(a.resolution), static_cast<float>(a.gamma)};
+  options.border = static_cast<float>(a.border);
+  if (const auto wrong = options.validate()) throw InputError("lumigraph", "", *wrong);
+  return options;
+}
+
+VisibilityOptions visibility_of(const LumigraphArguments& a) {
+  const VisibilityOptions options{static_cast<float>(a.tolerance), static_cast<float>(a.silhouette)};
+  if (const auto wrong = options.validate()) throw InputError("lumigraph", "", *wrong);
+  return options;
+}
+
+PhotoSet read_photos(const LumigraphArguments& a) {
+  if (a.colmap.empty() == a.transforms.empty())
+    throw InputError("lumigraph", "", "needs photos: give either --colmap FOLDER or --transforms FILE");
+  if (!(a.scale > 0 && a.scale <= 1)) throw InputError("lumigraph", "--scale", "must be above 0 and at most 1");
+  PhotoSet set = a.colmap.empty() ? read_transforms(a.transforms) : read_colmap(a.colmap);
+  if (set.photos.size() < 2) throw InputError(set.source, "", "holds one photo only: nothing can be interpolated");
+  return scaled(std::move(set), a.scale);
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw InputError(folder.string(), "", "is no folder that can be made: " + error.message());
+}
+
+// |a − b| around mid-grey for codes; plain difference for linear pictures.
+Picture difference_of(const Picture& a, const Picture& b, const ImageU8& where) {
+  return std::visit(
+      [&]<typename T>(const Image<T>& x) -> Picture {
+        const auto& y = std::get<Image<T>>(b);
+        Image<T> out(x.width, x.height, 3);
+        for (std::size_t i = 0; i < out.data.size(); ++i) {
+          if (where.data[i / 3] == 0) continue;
+          if constexpr (std::is_integral_v<T>)
+            out.data[i] = static_cast<T>(std::clamp(128 + x.data[i] - y.data[i], 0, 255));
+          else
+            out.data[i] = x.data[i] - y.data[i];
+        }
+        return out;
+      },
+      a);
+}
+
+void run_leave_one_out(const LumigraphArguments& a, const PhotoSet& set, const Lumigraph& lumigraph,
+                       std::chrono::steady_clock::time_point start) {
+  if (!a.output.empty()) make_folder(a.output);
+  const LeaveOneOut result = leave_one_out(
+      lumigraph, set, options_of(a),
+      [&](const LeftOutView& view, const LeftOutPictures& pictures) {
+        if (a.output.empty()) return;
+        const fs::path stem = a.output / fs::path(view.name).filename().stem();
+        write_picture(stem, pictures.foretold.picture);
+        write_picture(stem.string() + "_difference",
+                      difference_of(pictures.foretold.picture, pictures.photo, pictures.foretold.covered));
+      },
+      progress_bar());
+  nlohmann::json summary{{"psnr_db", result.psnr_db},
+                         {"nearest_view_psnr_db", result.nearest_view_psnr_db},
+                         {"ssim", result.ssim},
+                         {"proxy", describe(lumigraph.proxy())},
+                         {"seconds", seconds_since(start)},
+                         {"views", nlohmann::json::array()}};
+  std::string text;
+  for (const LeftOutView& view : result.views) {
+    summary["views"].push_back({{"name", view.name},
+                                {"psnr_db", view.psnr_db},
+                                {"ssim", view.ssim},
+                                {"nearest_view_psnr_db", view.nearest_view_psnr_db},
+                                {"covered", view.covered}});
+    text += fmt::format("{}: {:.2f} dB, SSIM {:.4f}, nearest view {:.2f} dB\n", view.name, view.psnr_db, view.ssim,
+                        view.nearest_view_psnr_db);
+  }
+  text += fmt::format("mean {:.2f} dB, SSIM {:.4f}, nearest view {:.2f} dB; {:.1f} s\n", result.psnr_db, result.ssim,
+                      result.nearest_view_psnr_db, seconds_since(start));
+  print_summary(a.json, summary, text);
+}
+
+void run(LumigraphArguments& a) {
+  const auto start = std::chrono::steady_clock::now();
+  const PhotoSet set = read_photos(a);
+  const fs::path folder = a.colmap.empty() ? a.transforms.parent_path() : a.colmap;
+  const Lumigraph lumigraph(set, make_proxy(a.proxy, set, folder), visibility_of(a), progress_bar());
+  run_leave_one_out(a, set, lumigraph, start);
+}
+
+}  // namespace
+
+void add_lumigraph_command(CommandLine& program) {
+  CommandLine command = program.command("lumigraph", "new views from posed photos and a rough shape");
+  const auto a = std::make_shared<LumigraphArguments>();  // shared: the parser's callback outlives this function
+  command.option("--colmap", a->colmap, "folder of a COLMAP text model and its photos");
+  command.option("--transforms", a->transforms, "transforms.json of nerfstudio or instant-ngp");
+  command.option("--proxy", a->proxy, "plane, plane:D, sphere:R, box, box:x0,y0,z0,x1,y1,z1, tunnel:W,H[,D] or a mesh");
+  command.option("--camera-path", a->camera_path, "JSON of the views to make");
+  command.flag("--leave-one-out", a->leave_one_out, "foretell every photo from the others, and say how well");
+  command.option("-o,--output", a->output, "folder for the pictures");
+  command.option("-k", a->k, "photos that speak for a ray");
+  command.option("--angle", a->angle, "α: penalty per radian between the wanted ray and the photo's");
+  command.option("--resolution", a->resolution, "β: penalty per octave by which the photo is coarser than wanted");
+  command.option("--gamma", a->gamma, "γ: how strongly photos are shunned at their borders and where half hidden");
+  command.option("--border", a->border, "width of a photo's soft border, as a fraction of its shorter side");
+  command.option("--tolerance", a->tolerance, "depth, relative, by which a point may lie behind what a photo sees");
+  command.option("--silhouette", a->silhouette, "pixels at jumps of its depth where a photo is not trusted");
+  command.option("--scale", a->scale, "size that photos are brought to first, 0 to 1");
+  add_json_flag(command, a->json);
+  command.on_run([a] { run(*a); });
+}
+
+}  // namespace mf
