@@ -29,7 +29,7 @@ class LumigraphWindow {
       box_ = fitted(picture_room(window_.width(), window_.height()), view_.aspect());
       const Panel panel(window_,
                         "Drag: orbit    right: turn    middle: shift\nwheel: nearer    Shift+wheel: focus\n"
-                        "W A S D Q E: fly    B: blending field\nP: face the plane    K: key view");
+                        "W A S D Q E: fly    B: blending field\nP: face the plane    K: key view    R: render path");
       draw_settings();
       take_pointer();
       take_keys();
@@ -184,10 +184,11 @@ class LumigraphWindow {
     ImGui::EndDisabled();
     ImGui::SameLine();
     ImGui::BeginDisabled(recorder_.keys().size() < 2 || recorder_.is_working());
-    const bool start = ImGui::Button("render path");
+    const bool clicked = ImGui::Button("render path");
     ImGui::EndDisabled();
+    const bool may_start = recorder_.keys().size() >= 2 && !recorder_.is_working();
     try {
-      if (start) recorder_.start();
+      if (may_start && (clicked || window_.pressed('R'))) recorder_.start();
       if (recorder_.is_working()) {
         recorder_.work([this](const View& view) { return view_.render(view, static_cast<double>(stops_)); });
         window_.hurry();
