@@ -90,8 +90,6 @@ class LumigraphWindow {
   }
 
   void take_keys() {
-    const ImGuiIO& io = ImGui::GetIO();
-    if (io.KeyCtrl) return;
     if (window_.pressed('B')) toggle_blending_field();
     if (window_.pressed('K')) recorder_.add_key(view_.view(box_.width));
     if (window_.pressed('P') && view_.has_focus()) {
@@ -109,7 +107,7 @@ class LumigraphWindow {
     // The speed is what lay ahead when the flight began: in half a second halfway there.
     if (!flight_speed_) flight_speed_ = view_.depth_ahead();
     constexpr double longest_step_s = 0.1;  // the first frame after a rest is no leap
-    const double seconds = std::min(static_cast<double>(io.DeltaTime), longest_step_s);
+    const double seconds = std::min(static_cast<double>(ImGui::GetIO().DeltaTime), longest_step_s);
     navigate(moved(view_.navigation(), way.normalized() * *flight_speed_ * seconds));
     window_.hurry();
   }

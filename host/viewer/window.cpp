@@ -88,28 +88,37 @@ class Gui {
   }
 };
 
+// A key that went down, and whether Ctrl was down with it then.
+struct KeyPress {
+  int key = 0;  // GLFW's; letters are ASCII
+  bool with_ctrl = false;
+};
+
 }  // namespace
 
 // In the order in which they need each other.
 struct Window::Handles {
   Glfw glfw;
+  // Dear ImGui 1.86 only knows what is down when a frame begins. It calls the callbacks that it finds: this one stays.
+  std::vector<KeyPress> arriving, pressed;  // since the last frame began, and before it
   WindowHandle window;
-  // Dear ImGui 1.86 only sees keys that are down when a frame begins. ImGui calls the callbacks that it finds.
-  std::vector<int> arriving, pressed;  // keys since the last frame began, and before it
   Gui gui;
 
   Handles(const std::string& title, int width, int height)
       : window(listening(open_window(title, width, height), arriving)), gui(window.get()) {}
 
-  static WindowHandle listening(WindowHandle window, std::vector<int>& keys) {
-    glfwSetWindowUserPointer(window.get(), &keys);
-    glfwSetKeyCallback(window.get(), [](GLFWwindow* w, int key, int, int action, int) {
-      if (action == GLFW_PRESS) static_cast<std::vector<int>*>(glfwGetWindowUserPointer(w))->push_back(key);
+  static WindowHandle listening(WindowHandle window, std::vector<KeyPress>& presses) {
+    glfwSetWindowUserPointer(window.get(), &presses);
+    glfwSetKeyCallback(window.get(), [](GLFWwindow* w, int key, int, int action, int modifiers) {
+      if (action == GLFW_PRESS)
+        static_cast<std::vector<KeyPress>*>(glfwGetWindowUserPointer(w))
+            ->push_back({key, (modifiers & GLFW_MOD_CONTROL) != 0});
     });
     return window;
   }
-  [[nodiscard]] bool was_pressed(int key) const {
-    return std::find(pressed.begin(), pressed.end(), key) != pressed.end();
+  [[nodiscard]] bool was_pressed(int key, bool with_ctrl) const {
+    return std::any_of(pressed.begin(), pressed.end(),
+                       [&](const KeyPress& p) { return p.key == key && p.with_ctrl == with_ctrl; });
   }
 };
 
@@ -133,7 +142,7 @@ bool Window::begin_frame() {
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
   const ImGuiIO& io = ImGui::GetIO();
-  if (io.KeyCtrl && pressed('Q')) glfwSetWindowShouldClose(window, GLFW_TRUE);
+  if (handles_->was_pressed(GLFW_KEY_Q, true)) glfwSetWindowShouldClose(window, GLFW_TRUE);
   width_ = static_cast<int>(io.DisplaySize.x);
   height_ = static_cast<int>(io.DisplaySize.y);
   return true;
@@ -147,12 +156,12 @@ void Window::end_frame() {
   glClearColor(0.09F, 0.09F, 0.1F, 1);
   glClear(GL_COLOR_BUFFER_BIT);
   ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
-  if (handles_->was_pressed(GLFW_KEY_F12)) write_screenshot();
+  if (handles_->was_pressed(GLFW_KEY_F12, false)) write_screenshot();
   glfwSwapBuffers(handles_->window.get());
 }
 
 bool Window::pressed(char letter) const {
-  return handles_->was_pressed(letter);  // GLFW's codes of letters are ASCII
+  return handles_->was_pressed(letter, false);
 }
 
 bool Window::held(char letter) const {

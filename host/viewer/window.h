@@ -40,7 +40,7 @@ class Window {
   // Where the pointer is; nothing while it is over a panel or outside.
   [[nodiscard]] std::optional<Eigen::Vector2d> pointer() const;
 
-  // A letter's key ('A' to 'Z'): went down since the last frame (however short), and is down now.
+  // A letter's key ('A' to 'Z'): went down without Ctrl since the last frame (however short), and is down now.
   [[nodiscard]] bool pressed(char letter) const;
   [[nodiscard]] bool held(char letter) const;
 

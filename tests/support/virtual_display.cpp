@@ -40,7 +40,7 @@ void pause_ms(int milliseconds) {
 }
 
 // Long enough that a busy machine's program sees one state before the next.
-constexpr int step_ms = 60;
+constexpr int step_ms = 150;
 
 }  // namespace
 
@@ -103,18 +103,22 @@ void VirtualDisplay::drag(const std::vector<Eigen::Vector2d>& pixels) const {
 
 void VirtualDisplay::scroll(Wheel way) const {
   xdotool({"click", std::to_string(static_cast<int>(way))});
+  pause_ms(step_ms);
 }
 
 void VirtualDisplay::press(const std::string& key) const {
   xdotool({"key", key});
+  pause_ms(step_ms);
 }
 
 void VirtualDisplay::hold_key(const std::string& key) const {
   xdotool({"keydown", key});
+  pause_ms(step_ms);
 }
 
 void VirtualDisplay::release_key(const std::string& key) const {
   xdotool({"keyup", key});
+  pause_ms(step_ms);
 }
 
 }  // namespace mf::test

@@ -133,7 +133,6 @@ TEST_F(LumigraphWindow, OrbitsAboutTheMiddleAndFocusesWithTheWheel) {
   display.point_at(box_.pixel_of({0.5, 0.6}));
   display.hold_key("shift");
   for (int i = 0; i < 6; ++i) display.scroll(VirtualDisplay::Wheel::up);
-  display.release_key("shift");
   const auto changed = [&](const ImageU8& s) {
     double sum = 0;
     for (int y = box_.y; y < box_.y + box_.height; y += 10)
@@ -142,6 +141,7 @@ TEST_F(LumigraphWindow, OrbitsAboutTheMiddleAndFocusesWithTheWheel) {
     return sum;
   };
   EXPECT_TRUE(display.becomes([&](const ImageU8& s) { return changed(s) > 50; })) << "the wheel changed nothing";
+  display.release_key("shift");
 }
 
 TEST_F(LumigraphWindow, FliesWhileAKeyIsHeldAndRecordsAPath) {
