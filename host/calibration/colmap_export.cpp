@@ -67,7 +67,7 @@ ImageU8 mask_of(const Polygon2& polygon, int width, int height) {
 }
 
 // One for all pictures, so that they stay comparable: what brings the middle of the lit pixels to a photographic grey.
-double display_exposure(const ImageF& picture) {
+double grey_exposure(const ImageF& picture) {
   std::vector<float> lit;
   for (const float v : picture.data)
     if (v > 0) lit.push_back(v);
@@ -99,7 +99,7 @@ class Export {
 
   void add_scene(const SessionFrame& frame) {
     const ImageF picture = read(frame);
-    if (exposure_ == 0) exposure_ = display_exposure(picture);
+    if (exposure_ == 0) exposure_ = grey_exposure(picture);
     const std::string name = "scene/" + png_name(frame.info.name);
     write_png(folder_ / "images" / name, to_srgb8(picture, exposure_));
     lines_ += image_line(++count_, calibration_.cam_from_world.value_or(Rigid3{}), direct_camera_id, name);
@@ -110,7 +110,7 @@ class Export {
         mirror_view(pose.cam_from_mirror, session_.header().target, calibration_.camera);
     if (!view) return;
     ImageF picture = read(frame);
-    if (exposure_ == 0) exposure_ = display_exposure(picture);
+    if (exposure_ == 0) exposure_ = grey_exposure(picture);
     flip_x(picture);
     ImageU8 mask = mask_of(view->opening_in_img, picture.width, picture.height);
     flip_x(mask);

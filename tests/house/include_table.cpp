@@ -96,6 +96,8 @@ const std::vector<Library>& known_libraries() {
       {"TBB", {"tbb/", "oneapi/tbb"}},
       {"assimp", {"assimp/"}},
       {"GL", {"epoxy/", "EGL/", "GLES", "GL/"}},
+      {"GLFW", {"GLFW/"}},
+      {"ImGui", {"imgui", "backends/imgui_impl"}},
       {"Aravis", {"arv.h", "aravis"}},
       {"V4L2", {"linux/videodev2.h", "linux/v4l2"}},
       {"libusb", {"libusb"}},
@@ -139,6 +141,11 @@ const std::vector<FolderRule>& include_table() {
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
       {"host/lumigraph/", stage_headers, stage_libraries + Names{"GL", "Embree"}},
       {"host/report/", stage_headers + records, stage_libraries},
+      // It shows what two stages give, and lets a hand ask them for more.
+      {"host/viewer/",
+       stage_headers + records +
+           Names{"host/light_field/probe.h", "host/light_field/surroundings.h", "host/lumigraph/"},
+       stage_libraries + Names{"GL", "GLFW", "ImGui"}},
       {"host/cli/", {"common/", "host/"}, stage_libraries},
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},
