@@ -27,7 +27,8 @@ const Names stage_libraries = vocabulary + Names{"TBB"};
 // The plain structs that stages hand forward.
 const Names records{"host/calibration/calibration.h", "host/light_field/light_field.h",
                     "host/light_field/direction_set.h"};
-const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/"};
+const Names stage_headers =
+    Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/", "host/team/"};
 
 bool starts_with_any(std::string_view text, const Names& beginnings) {
   return std::any_of(beginnings.begin(), beginnings.end(), [&](std::string_view b) { return text.starts_with(b); });
@@ -107,6 +108,7 @@ const std::vector<Library>& known_libraries() {
       {"systemd", {"systemd/"}},
       {"microhttpd", {"microhttpd.h"}},
       {"umockdev", {"umockdev.h"}},
+      {"MPI", {"mpi.h"}},
       {"GoogleTest", {"gtest/", "gmock/"}},
       {"benchmark", {"benchmark/"}},
       {"SIMD", {"immintrin.h", "xmmintrin.h", "x86intrin.h", "pmmintrin.h"}},
@@ -128,6 +130,7 @@ const std::vector<FolderRule>& include_table() {
        {"common/", "device/"},
        vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev", "usbfs"}},
       {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "JPEG", "TIFF", "assimp"}},
+      {"host/team/", {"common/"}, Names{"MPI"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
       {"host/photometry/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
