@@ -6,13 +6,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/error.h"
-#include "common/response_curve.h"
-#include "common/session.h"
 #include "host/cli/command.h"
 #include "host/cli/peak_memory.h"
 #include "host/cli/run_resample.h"
-#include "host/cli/session_files.h"
+#include "host/cli/session_views.h"
 
 namespace mf {
 
@@ -69,27 +66,11 @@ void run(ResampleArguments& a) {
 
 ResampleResult run_resample(const std::filesystem::path& folder, const std::filesystem::path& output,
                             const ResampleOptions& options, Team& team, const Progress& progress) {
-  if (const auto problem = options.validate())
-    throw InputError("resample", "--" + problem->substr(0, problem->find(':')),
-                     problem->substr(problem->find(':') + 2));
   const auto start = std::chrono::steady_clock::now();
-  const SessionReader session(folder);
-  const ResponseCurve response = response_of(session);
-  const Calibration calibration = calibration_of(session);
-  std::optional<PlaneRectangle> rectangle;
-  if (options.rectangle) {
-    const auto& r = *options.rectangle;
-    rectangle = PlaneRectangle{{Eigen::Quaterniond::Identity(), {0, 0, options.height_m}}, {r[0], r[1]}, {r[2], r[3]}};
-  } else {
-    rectangle = covered_rectangle(calibration, session.header().target, options.height_m);
-  }
-  if (!rectangle)
-    throw InputError((folder / "calibration.json").string(), "frames",
-                     "no mirror view looks through the plane at this --height: lower it, or give --rectangle");
-  const std::vector<FieldView> views = load_field_views(session, response, calibration, team, progress);
+  const SessionViews session = load_session_views("resample", folder, options, team, progress);
   const double loading = seconds_since(start);
-  Resampling resampling(views, *rectangle, options, team, progress);
-  ResampleResult result = resample_to_file(resampling, output, response.absolute, team, progress);
+  Resampling resampling(session.views, session.rectangle, options, team, progress);
+  ResampleResult result = resample_to_file(resampling, output, session.absolute, team, progress);
   result.seconds["loading"] = loading;
   result.seconds["total"] = seconds_since(start);
   return result;

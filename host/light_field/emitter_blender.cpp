@@ -84,6 +84,10 @@ EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surrou
   }
 }
 
+EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
+                               std::vector<ShadedEmitter> emitters)
+    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)) {}
+
 bool EmitterBlender::concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
   return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
     const Eigen::Vector3f to = s.emitter.position - p;

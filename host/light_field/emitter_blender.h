@@ -29,6 +29,8 @@ class EmitterBlender {
   // references to views and surroundings.
   EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::span<const Emitter>,
                  const PlaneRectangle&, const Team&);
+  // With masks that are drawn already.
+  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>);
 
   // Whether rays within `angle_rad` of the direction may see an emitter or a ghost of one.
   [[nodiscard]] bool concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;

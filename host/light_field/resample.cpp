@@ -69,6 +69,7 @@ std::optional<std::string> ResampleOptions::validate() const {
 
 struct Resampling::Impl {
   const std::vector<FieldView>& views;
+  int k = 0;
   LightField field;
   std::vector<SphereScore> sphere_scores;
   double focusing_s = 0;
@@ -81,7 +82,7 @@ struct Resampling::Impl {
 
 Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
                        const ResampleOptions& options, const Team& team, const Progress& progress)
-    : impl_(new Impl{views, {}, {}, 0, {}, {}, {}, {}}) {
+    : impl_(new Impl{views, 0, {}, {}, 0, {}, {}, {}, {}}) {
   check(!options.validate().has_value(), "resample options are validated by the caller");
   const auto start = Clock::now();
   report_progress(progress, "focusing", 0);
@@ -91,6 +92,7 @@ Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle
   field.resolution = options.size;
   field.directions = geodesic_hemisphere(options.directions);
   const int k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
+  i.k = k;
   const std::vector<Emitter> emitters = options.proxy == "plane" ? std::vector<Emitter>{} : find_emitters(views);
   field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, team, i.sphere_scores);
   field.options_json = options_to_json(options, k, field.surroundings);
@@ -111,6 +113,9 @@ Resampling::~Resampling() = default;
 
 const LightField& Resampling::field() const {
   return impl_->field;
+}
+int Resampling::k() const {
+  return impl_->k;
 }
 const std::vector<SphereScore>& Resampling::sphere_scores() const {
   return impl_->sphere_scores;

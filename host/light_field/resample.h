@@ -53,6 +53,7 @@ class Resampling {
 
   // Everything but the texels.
   [[nodiscard]] const LightField& field() const;
+  [[nodiscard]] int k() const;  // views blended for a ray
   // One direction's tile, resolution² texels. In any thread, in any order: the result is the same.
   void fill(std::size_t direction, Eigen::Vector4f* tile);
 
