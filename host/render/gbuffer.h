@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/render/ray_scene.h"
+#include "host/tracing/ray_scene.h"
 #include "host/render/surface_point.h"
 #include "host/render/view.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "host/render/light_set.h"
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 namespace mf {
 

@@ -27,7 +27,7 @@ const Names stage_libraries = vocabulary + Names{"TBB"};
 // The plain structs that stages hand forward.
 const Names records{"host/calibration/calibration.h", "host/light_field/light_field.h",
                     "host/light_field/direction_set.h"};
-const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/"};
+const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/"};
 
 bool starts_with_any(std::string_view text, const Names& beginnings) {
   return std::any_of(beginnings.begin(), beginnings.end(), [&](std::string_view b) { return text.starts_with(b); });
@@ -130,9 +130,10 @@ const std::vector<FolderRule>& include_table() {
       {"host/photometry/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/calibration/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/blending/", {"common/"}, stage_libraries},
+      {"host/tracing/", {"common/", "host/io/"}, stage_libraries + Names{"Embree"}},
       {"host/light_field/", stage_headers + Names{"host/calibration/calibration.h"},
        stage_libraries + Names{"OpenEXR", "Imath", "SIMD"}},
-      {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree", "assimp"}},
+      {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree"}},
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
       {"host/report/", stage_headers + records, stage_libraries},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 #include <assimp/material.h>
 #include <assimp/postprocess.h>
