@@ -88,6 +88,9 @@ class SessionWriter {
   };
   struct Options {
     Durability durability = Durability::each;
+    // In batches: the system's memory need not hold the frames that are durable. A recording would fill it in a minute,
+    // and to find ever more pages costs more than to use the same ones again.
+    bool read_later = false;
   };
   SessionWriter(const std::filesystem::path& folder, const SessionHeader&, const Options&);
   SessionWriter(SessionWriter&&) noexcept;

@@ -293,7 +293,7 @@ void SessionWriter::Impl::make_durable(std::vector<Pending>& frames) {
   for (Pending& p : frames) {
     if (p.durable) continue;
     try {
-      sync_path(folder / p.frame.file);
+      sync_path(folder / p.frame.file, options.read_later ? AfterSync::drop : AfterSync::keep);
     } catch (const WriteError& e) {
       write_under_new_names(p.frame, p.tiff, true, e);
     }

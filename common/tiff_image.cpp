@@ -286,7 +286,8 @@ std::string encode(const Image<Pixel>& image, TiffCompression compression) {
   constexpr bool is_float = std::is_same_v<Pixel, float>;
   MemoryFile memory;
   memory.writing = true;
-  memory.written.reserve(image.data.size() * sizeof(Pixel) + 4096);
+  const std::size_t raw_bytes = image.data.size() * sizeof(Pixel);
+  memory.written.reserve((compression == TiffCompression::none ? raw_bytes : raw_bytes / 4 * 3) + 4096);
   const TiffHandle handle = open_tiff(memory);
   check(handle != nullptr, "a TIFF opens in memory");
   TIFF* tiff = handle.get();

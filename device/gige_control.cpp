@@ -7,13 +7,13 @@ namespace mf {
 
 namespace {
 
-// GigE Vision 1.2, the register "control channel privilege".
-bool has_forgotten_us(ArvDevice* device) {
+// By the register "control channel privilege" of GigE Vision 1.2. Aravis asks six times, for half a second each.
+bool answers_as_ours(ArvDevice* device) {
   constexpr std::uint64_t privilege_register = 0x0a00;
   constexpr std::uint32_t exclusive = 1, control = 2;
   std::uint32_t privilege = 0;
   if (arv_device_read_register(device, privilege_register, &privilege, nullptr) == 0) return false;
-  return (privilege & (exclusive | control)) == 0;
+  return (privilege & (exclusive | control)) != 0;
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ bool GigeControl::is_lost() {
   using std::chrono::steady_clock;
   if (asking_.valid()) return asking_.wait_for(std::chrono::seconds(0)) == std::future_status::ready && asking_.get();
   if (steady_clock::now() - last_frame_ > patience_)
-    asking_ = std::async(std::launch::async, [device = device_] { return has_forgotten_us(device); });
+    asking_ = std::async(std::launch::async, [device = device_] { return !answers_as_ours(device); });
   return false;
 }
 

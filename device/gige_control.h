@@ -9,7 +9,7 @@
 namespace mf {
 
 // Whether a GigE camera still is under our control. One that lost its power for a moment has booted anew: it answers,
-// but has forgotten its client, and sends nothing. Aravis' heartbeat looks once a second, or up to three; this looks as
+// but has forgotten its client, and sends nothing. Aravis' heartbeat looks once a second and is patient; this looks as
 // soon as frames stay away.
 class GigeControl {
  public:
@@ -17,7 +17,7 @@ class GigeControl {
   GigeControl(ArvDevice* device, std::chrono::milliseconds patience);
 
   void note_frame() { last_frame_ = std::chrono::steady_clock::now(); }
-  // Never waits for the camera. One that does not answer is not lost yet: Aravis decides on that.
+  // Never waits for the camera. One that neither sends nor answers is lost after three seconds.
   [[nodiscard]] bool is_lost();
 
  private:

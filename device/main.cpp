@@ -84,7 +84,7 @@ void show(const mf::RigStatus& s) {
 // A frame's memory comes and goes many times a second. Given back to the system, every page of it would be a fault
 // anew.
 void keep_memory() {
-  constexpr int larger_than_a_frame = 64 << 20, most_kept = 256 << 20;
+  constexpr int larger_than_a_frame = 64 << 20, most_kept = 64 << 20;
   mallopt(M_MMAP_THRESHOLD, larger_than_a_frame);
   mallopt(M_TRIM_THRESHOLD, most_kept);
 }

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <csignal>
 #include <fstream>
 #include <map>
 #include <thread>
+#include <vector>
 
 #include "common/session.h"
 #include "hw-sim/child_process.h"
@@ -38,10 +40,10 @@ GigeCameraOptions camera_options() {
 }
 
 void write_config(const fs::path& folder) {
-  std::ofstream(folder / "rig.toml") << "[camera]\naddress = '127.0.7.1'\npacket_bytes = 8000\n[mirror]\n"
-                                        "target = 'target.json'\nworld = 'world.json'\n[recording]\nfolder = '.'\n"
-                                        "black_level_hint = 64\n[detection]\nduty = 0.15\n"
-                                        "[status]\nsocket = 'status.sock'\n";
+  std::ofstream(folder / "rig.toml")
+      << "[camera]\naddress = '127.0.7.1'\npacket_bytes = 8000\n[mirror]\n"
+         "target = 'target.json'\nworld = 'world.json'\n[recording]\nfolder = '.'\n"
+         "black_level_hint = 64\n[detection]\nduty = 0.15\n[status]\nsocket = 'status.sock'\n";
 }
 
 double resident_mb(const fs::path& proc) {
@@ -49,6 +51,14 @@ double resident_mb(const fs::path& proc) {
   for (std::string line; std::getline(status, line);)
     if (line.starts_with("VmRSS:")) return std::stod(line.substr(6)) / 1024;
   return 0;
+}
+
+double median_of_quarter(const std::vector<double>& values, std::size_t quarter) {
+  const std::size_t length = values.size() / 4;
+  const auto begin = values.begin() + static_cast<std::ptrdiff_t>(quarter * length);
+  std::vector<double> part(begin, begin + static_cast<std::ptrdiff_t>(length));
+  std::nth_element(part.begin(), part.begin() + static_cast<std::ptrdiff_t>(length / 2), part.end());
+  return part.at(length / 2);
 }
 
 struct CpuTime {
@@ -115,39 +125,42 @@ TEST(Soak, NothingIsLostAndNothingGrows) {
   StatusListener listener(folder / "status.sock");
   Starvation starvation(daemon.process());
   int most_queued = 0;
-  double memory_mb = 0, most_memory_mb = 0;
+  std::vector<double> memory_mb;
   while (elapsed() < seconds) {
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
     ASSERT_FALSE(daemon.wait(std::chrono::milliseconds(0)).has_value()) << "the daemon ended";
     most_queued = std::max(most_queued, listener.latest().queued);
     starvation.look();
-    const double now_mb = resident_mb(fs::path("/proc") / std::to_string(daemon.process()));
-    if (elapsed() > 15 && memory_mb == 0) memory_mb = now_mb;  // everything is allocated by then
-    most_memory_mb = std::max(most_memory_mb, now_mb);
+    memory_mb.push_back(resident_mb(fs::path("/proc") / std::to_string(daemon.process())));
   }
   daemon.signal(SIGTERM);
   ASSERT_EQ(daemon.wait(std::chrono::seconds(30)), 0);
 
   const SessionReader session(folder / "s");
-  for (const FrameGap& gap : session.gaps()) ADD_FAILURE() << gap.missing << " frames: " << gap.reason;
+  constexpr double own_machine_s = 0.1;  // of a second that a thread waited: beyond it, others were at work, too
+  const bool starved = starvation.most_s() > own_machine_s;
+  for (const FrameGap& gap : session.gaps())  // to the daemon, a machine that stands still is a clock that jumps
+    EXPECT_TRUE(starved && gap.missing == 0) << gap.missing << " frames: " << gap.reason;
   const std::vector<SessionFrame>& frames = session.frames();
   // A machine that is busy elsewhere sends fewer; each that was sent must be there.
   EXPECT_GT(static_cast<double>(frames.size()), 0.5 * rate_hz * (seconds - 10));
   for (std::size_t i = 1; i < frames.size(); ++i)
     ASSERT_EQ(frames[i].arrival->device_frame, frames[i - 1].arrival->device_frame % 65535 + 1);
-  constexpr double own_machine_s = 0.1;  // of a second that a thread waited: beyond it, others were at work, too
-  EXPECT_LE(most_queued, starvation.most_s() < own_machine_s ? 12 : 24) << "of 48; a quarter is asked";
-  EXPECT_LT(most_memory_mb, memory_mb + 8);
+  EXPECT_LE(most_queued, starved ? 24 : 12) << "of 48; a quarter is asked";
+  const double second_mb = median_of_quarter(memory_mb, 1), last_mb = median_of_quarter(memory_mb, 3);
+  EXPECT_LT(last_mb, second_mb + 8);
   const CpuTime cpu = child_cpu();
-  // Of the time that so many frames take: a busy machine sends fewer.
-  const double core = (cpu.user_s + cpu.system_s) * rate_hz / static_cast<double>(frames.size());
+  const double used_s = cpu.user_s + cpu.system_s;
+  // A busy machine sends fewer frames, for which it then does more of the detection: this is too much rather than too
+  // little.
+  const double core = used_s * rate_hz / static_cast<double>(frames.size());
   EXPECT_LE(core, 0.75) << "0.6 is asked, of a machine of its own";
   std::printf(
-      "%zu frames in %.0f s, queue at most %d of 48, %.0f MB then at most %.0f MB, tags in %zu frames\n"
-      "processor: %.1f s user, %.1f s system, %.0f %% of one core at %.0f frames a second; a thread waited %.2f s of a "
+      "%zu frames in %.0f s, queue at most %d of 48, %.0f MB then %.0f MB, tags in %zu frames\n"
+      "processor: %.1f s user, %.1f s system; at %.0f frames a second %.0f %% of one core; a thread waited %.2f s of a "
       "second for its core\n",
-      frames.size(), seconds, most_queued, memory_mb, most_memory_mb, session.tags().size(), cpu.user_s, cpu.system_s,
-      100 * core, rate_hz, starvation.most_s());
+      frames.size(), seconds, most_queued, second_mb, last_mb, session.tags().size(), cpu.user_s, cpu.system_s, rate_hz,
+      100 * core, starvation.most_s());
 }
 
 }  // namespace
