@@ -99,8 +99,13 @@ std::optional<EdgeModel> first_guess(const std::vector<SidePixel>& pixels, doubl
   return out;
 }
 
-// A round of weighted Gauss–Newton; returns the mean square of what the model left before it.
-double improve(EdgeModel& model, const std::vector<SidePixel>& pixels, double least_variance) {
+struct Round {
+  double moved;  // by how much an end of the edge went, pixels
+  double noise;  // root mean square of what the model left before
+};
+
+// Weighted Gauss–Newton.
+Round improve(EdgeModel& model, const std::vector<SidePixel>& pixels, double least_variance) {
   EdgeModel::Matrix normal = EdgeModel::Matrix::Zero();
   EdgeModel::Vector gradient = EdgeModel::Vector::Zero(), slope;
   double squares = 0;
@@ -114,24 +119,30 @@ double improve(EdgeModel& model, const std::vector<SidePixel>& pixels, double le
   }
   constexpr double damping = 1e-3;  // a blur that cannot be told from the levels' difference stays as it was
   normal.diagonal() *= 1 + damping;
-  model.x += normal.ldlt().solve(gradient);
-  return squares / static_cast<double>(pixels.size());
+  const EdgeModel::Vector step = normal.ldlt().solve(gradient);
+  const double wanted = std::abs(step[EdgeModel::offset]) + std::abs(step[EdgeModel::tilt]);
+  const double most = 0.5 * model.x[EdgeModel::blur];  // farther away the slopes say nothing
+  const double share = wanted > most ? most / wanted : 1;
+  model.x += share * step;
+  return {share * wanted, std::sqrt(squares / static_cast<double>(pixels.size()))};
 }
 
 // Nothing when no such edge is within reach.
 std::optional<EdgeModel> fitted(EdgeModel model, const std::vector<SidePixel>& pixels, double reach) {
-  constexpr int rounds = 3;            // a fourth changes the corners' RMS by less than 0.005 px
-  constexpr double least_blur = 0.6;   // pixels: that of their own area
-  constexpr double least_light = 0.2;  // of the bright side: black ink must not rule alone
+  constexpr int rounds = 3;             // one more changes the corners' RMS by less than 0.005 px,
+  constexpr int most_rounds = 8;        // unless the start was far off:
+  constexpr double still_moving = 0.2;  // pixels a round
+  constexpr double least_blur = 1;      // pixels: a narrower edge could lie between two rows and be felt by neither
+  constexpr double least_light = 0.2;   // of the bright side: black ink must not rule alone
   const double least_variance = least_light * (model.x[EdgeModel::middle] + model.x[EdgeModel::half]);
-  double noise = 0;
-  for (int round = 0; round < rounds; ++round) {
-    noise = std::sqrt(improve(model, pixels, least_variance));
+  Round last{reach, 0};
+  for (int round = 0; round < rounds || (round < most_rounds && last.moved > still_moving); ++round) {
+    last = improve(model, pixels, least_variance);
     model.x[EdgeModel::blur] = std::clamp(model.x[EdgeModel::blur], least_blur, reach);
     const bool near = std::abs(model.x[EdgeModel::offset]) + std::abs(model.x[EdgeModel::tilt]) < reach;
     if (!near || !(model.x[EdgeModel::half] > 0)) return std::nullopt;
   }
-  return 2 * model.x[EdgeModel::half] > noise ? std::optional(model) : std::nullopt;
+  return 2 * model.x[EdgeModel::half] > last.noise ? std::optional(model) : std::nullopt;
 }
 
 // The edge near a side of the square; nothing when it cannot be seen.

@@ -135,8 +135,7 @@ TEST(EdgeAlignment, FindsTheCornersOfASquare) {
   EXPECT_FALSE(align_edges(square.picture, start, 2));
 }
 
-// Noise of a fifth of the light. By the Cramér–Rao bound of an edge of 35 pixels, a corner cannot be known much better
-// than to 0.03 px.
+// Noise of a fifth of the light.
 TEST(EdgeAlignment, NoiseBesideAnEdgeDoesNotPullIt) {
   std::mt19937 random(1);
   std::normal_distribution<float> normal;
