@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
 #include "host/cli/command.h"
 #include "host/io/image_file.h"
+#include "host/lumigraph/camera_path.h"
 #include "host/lumigraph/leave_one_out.h"
 #include "host/lumigraph/picture_file.h"
 #include "host/lumigraph/read_photos.h"
@@ -118,12 +120,72 @@ void run_leave_one_out(const LumigraphArguments& a, const PhotoSet& set, const L
   print_summary(a.json, summary, text);
 }
 
+// A frame that shows nothing is a mistake of the path or the proxy, not a black picture.
+void check_shows_something(const LumigraphPicture& frame, std::size_t number, const LumigraphArguments& a) {
+  const auto& covered = frame.covered.data;
+  if (std::any_of(covered.begin(), covered.end(), [](std::uint8_t c) { return c != Covered::nothing; })) return;
+  throw InputError(a.camera_path.string(), fmt::format("frame {}", number),
+                   "shows nothing that the photos show: move it to where they look, or give another --proxy");
+}
+
+void run_camera_path(const LumigraphArguments& a, const Lumigraph& lumigraph,
+                     std::chrono::steady_clock::time_point start) {
+  if (a.output.empty()) throw InputError("lumigraph", "--output", "is missing: name a folder for the frames");
+  const std::vector<View> views = read_camera_path(a.camera_path);
+  const LumigraphOptions options = options_of(a);
+  const Progress progress = progress_bar();
+  make_folder(a.output);
+  double render_s = 0;
+  std::string extension;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    report_progress(progress, "frames", static_cast<double>(i) / static_cast<double>(views.size()));
+    const auto before = std::chrono::steady_clock::now();
+    const LumigraphPicture frame = lumigraph.render(views[i], options);
+    render_s += seconds_since(before);
+    check_shows_something(frame, i, a);
+    extension = write_picture(a.output / fmt::format("{:05}", i), frame.picture).extension();
+  }
+  report_progress(progress, "frames", 1);
+  const double per_second = static_cast<double>(views.size()) / render_s;
+  const std::string pattern = (a.output / ("%05d" + extension)).string();
+  print_summary(a.json,
+                {{"frames", views.size()},
+                 {"frames_per_second", per_second},
+                 {"proxy", describe(lumigraph.proxy())},
+                 {"photos", lumigraph.sources().size()},
+                 {"pictures", pattern},
+                 {"seconds", seconds_since(start)}},
+                fmt::format("{} frames from {} photos, {:.1f} a second; proxy: {}\n{}\n"
+                            "a video: ffmpeg -framerate 30 -i {} -pix_fmt yuv420p {}.mp4\n",
+                            views.size(), lumigraph.sources().size(), per_second, describe(lumigraph.proxy()), pattern,
+                            pattern, (a.output.parent_path() / a.output.stem()).string()));
+}
+
+// Some photo must see the proxy somewhere: looked at on a grid of its picture.
+void check_proxy_is_seen(const Lumigraph& lumigraph, const LumigraphArguments& a) {
+  constexpr int steps = 8;
+  for (const Lumigraph::Source& source : lumigraph.sources())
+    for (int i = 0; i < steps * steps; ++i) {
+      const Eigen::Vector2d pixel((i % steps + 0.5) / steps * source.camera.width,
+                                  (i / steps + 0.5) / steps * source.camera.height);
+      if (lumigraph.point_at({source.camera, source.cam_from_world}, pixel)) return;
+    }
+  throw InputError("--proxy", a.proxy,
+                   "lies behind the photos or beside what they show: is it in the frame of their poses?");
+}
+
 void run(LumigraphArguments& a) {
   const auto start = std::chrono::steady_clock::now();
+  if (a.leave_one_out != a.camera_path.empty())
+    throw InputError("lumigraph", "", "needs a task: give either --camera-path FILE or --leave-one-out");
   const PhotoSet set = read_photos(a);
   const fs::path folder = a.colmap.empty() ? a.transforms.parent_path() : a.colmap;
   const Lumigraph lumigraph(set, make_proxy(a.proxy, set, folder), visibility_of(a), progress_bar());
-  run_leave_one_out(a, set, lumigraph, start);
+  check_proxy_is_seen(lumigraph, a);
+  if (a.leave_one_out)
+    run_leave_one_out(a, set, lumigraph, start);
+  else
+    run_camera_path(a, lumigraph, start);
 }
 
 }  // namespace
@@ -134,7 +196,7 @@ void add_lumigraph_command(CommandLine& program) {
   command.option("--colmap", a->colmap, "folder of a COLMAP text model and its photos");
   command.option("--transforms", a->transforms, "transforms.json of nerfstudio or instant-ngp");
   command.option("--proxy", a->proxy, "plane, plane:D, sphere:R, box, box:x0,y0,z0,x1,y1,z1, tunnel:W,H[,D] or a mesh");
-  command.option("--camera-path", a->camera_path, "JSON of the views to make");
+  command.option("--camera-path", a->camera_path, "JSON of the views to make: a list of views, or key frames (docs/lumigraph.md)");
   command.flag("--leave-one-out", a->leave_one_out, "foretell every photo from the others, and say how well");
   command.option("-o,--output", a->output, "folder for the pictures");
   command.option("-k", a->k, "photos that speak for a ray");

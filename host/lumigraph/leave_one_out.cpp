@@ -81,7 +81,7 @@ double psnr_db(const Picture& picture, const Picture& truth, const ImageU8& wher
         double sum = 0;
         std::size_t count = 0;
         for (std::size_t i = 0; i < where.data.size(); ++i) {
-          if (where.data[i] == 0) continue;
+          if (where.data[i] != Covered::seen) continue;
           for (std::size_t c = 0; c < 3; ++c) {
             const double difference = (static_cast<double>(a.data[3 * i + c]) - b.data[3 * i + c]) / largest;
             sum += difference * difference;
@@ -107,7 +107,7 @@ double ssim(const Picture& picture, const Picture& truth, const ImageU8& where) 
   double sum = 0;
   std::size_t count = 0;
   for (std::size_t i = 0; i < where.data.size(); ++i) {
-    if (where.data[i] == 0) continue;
+    if (where.data[i] != Covered::seen) continue;
     const double ma = mean_a.data[i];
     const double mb = mean_b.data[i];
     const double va = aa.data[i] - ma * ma;
@@ -138,7 +138,7 @@ LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const
     const LumigraphPicture by_nearest = lumigraph.render(view, alone, {&nearest, 1});
     const Picture& photo = set.photos[i].picture;
     const double pixels = static_cast<double>(foretold.covered.data.size());
-    const auto covered = std::count_if(foretold.covered.data.begin(), foretold.covered.data.end(), [](auto v) { return v != 0; });
+    const auto covered = std::count_if(foretold.covered.data.begin(), foretold.covered.data.end(), [](auto v) { return v == Covered::seen; });
     const LeftOutView of_view{sources[i].name, psnr_db(foretold.picture, photo, foretold.covered),
                               ssim(foretold.picture, photo, foretold.covered),
                               psnr_db(by_nearest.picture, photo, by_nearest.covered),

@@ -13,10 +13,10 @@ namespace mf {
 // How well a lumigraph foretells a photo from all others, for every photo in turn.
 struct LeftOutView {
   std::string name;
-  double psnr_db = 0;               // over the pixels that the proxy covers
+  double psnr_db = 0;               // over the pixels that are seen, see Covered
   double ssim = 0;                  // the same pixels
-  double nearest_view_psnr_db = 0;  // the photo taken nearest by, alone, through the same proxy
-  double covered = 0;               // share of the photo's pixels
+  double nearest_view_psnr_db = 0;  // the photo taken nearest by, alone, over what it sees
+  double covered = 0;               // share of the photo's pixels that are seen
 };
 
 struct LeaveOneOut {
@@ -37,7 +37,7 @@ using TakeLeftOut = std::function<void(const LeftOutView&, const LeftOutPictures
 [[nodiscard]] LeaveOneOut leave_one_out(const Lumigraph&, const PhotoSet&, const LumigraphOptions&, const TakeLeftOut& = {},
                                         const Progress& = {});
 
-// The same for two pictures of one size, over the pixels where `where` is not 0.
+// The same for two pictures of one size, over the pixels that are seen.
 [[nodiscard]] double psnr_db(const Picture&, const Picture& truth, const ImageU8& where);
 // Structural similarity (Wang et al. 2004) of luma, Gaussian windows of σ = 1.5 px.
 [[nodiscard]] double ssim(const Picture&, const Picture& truth, const ImageU8& where);

@@ -20,6 +20,8 @@ namespace mf {
 
 namespace {
 
+constexpr float least_seen = 0.02F;  // far above what hidden points keep, far below what is looked at squarely
+
 template <typename T>
 void store(Image<T>& picture, std::size_t pixel, Float4 colour) {
   for (int c = 0; c < 3; ++c) {
@@ -48,7 +50,7 @@ inline __attribute__((always_inline)) void blend(const ChosenViews& chosen, Imag
     }
     if (!(speaking > 0)) continue;
     store(picture, pixel, sum);
-    covered.data[pixel] = 255;
+    covered.data[pixel] = chosen.sight[i] > least_seen ? Covered::seen : Covered::guessed;
   }
 }
 

@@ -24,17 +24,21 @@ namespace mf {
 enum class Shown { photos, blending_field };
 
 struct LumigraphOptions {
-  PenaltyOptions penalty;  // angle: of the chord at the proxy point, radians
-  float border = 0.1F;     // 0.001 to 0.5 of a photo's shorter side: width of its soft border
+  PenaltyOptions penalty{4, 1, 0.1F, 0.5F};  // angle: of the chord at the proxy point, radians
+  float border = 0.03F;    // 0.001 to 0.5 of a photo's shorter side: width of its soft border
   Shown shown = Shown::photos;
 
   // What is wrong, in words that name the field; nothing when all is well.
   [[nodiscard]] std::optional<std::string> validate() const;
 };
 
+// What a pixel rests on. A guess is a point of the proxy that lies in a photo's picture, but hidden or at a silhouette
+// in each: it has that photo's colour at the place.
+enum Covered : std::uint8_t { nothing = 0, guessed = 127, seen = 255 };
+
 struct LumigraphPicture {
   Picture picture;  // black where nothing is covered; the blending field is 8-bit always
-  ImageU8 covered;  // 255 where the proxy is and a photo shows it, else 0
+  ImageU8 covered;  // see Covered
 };
 
 // New views of a place from posed photos and a rough idea of its shape: unstructured lumigraph rendering (Buehler,

@@ -220,7 +220,7 @@ void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptio
             const RayAnswers& out) {
   const std::size_t count = rays.dx.size();
   alignas(64) std::array<float, largest_bundle> inverse_depth;
-  alignas(64) std::array<float, largest_bundle> weight;
+  const std::span<float> weight = out.weight;
   if (view.camera.distorted)
     project_distorted(view, rays, options, out, inverse_depth.data(), weight.data());
   else
@@ -228,9 +228,12 @@ void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptio
   if (view.sight != nullptr)
     for (std::size_t i = 0; i < count; ++i)
       if (weight[i] > 0) weight[i] *= sight_at(*view.sight, out.x[i], out.y[i], inverse_depth[i], depth_tolerance);
-  if (options.border != 1)
-    for (std::size_t i = 0; i < count; ++i) weight[i] = weight[i] > 0 ? std::pow(weight[i], options.border) : 0.0F;
-  divide(out.penalty.data(), weight.data(), count);
+  if (options.border == 1) {
+    divide(out.penalty.data(), weight.data(), count);
+    return;
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    out.penalty[i] = weight[i] > 0 ? out.penalty[i] / std::pow(weight[i], options.border) : infinite;
 }
 
 float least_penalty(const AnsweringView& view, const Eigen::Vector3f& centre, float radius,

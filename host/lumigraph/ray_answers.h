@@ -53,6 +53,7 @@ struct AnsweringView {
 struct RayAnswers {
   std::span<float> x, y;     // photo pixels
   std::span<float> lod;      // octaves by which the photo is finer than wanted, ≥ 0
+  std::span<float> weight;   // 0…1: soft border times sight, see RayTerms; 0: it says nothing
   std::span<float> penalty;  // infinite where it says nothing
 };
 
