@@ -11,8 +11,9 @@
 
 #include "common/check.h"
 #include "common/error.h"
+#include "common/json_file.h"
 #include "host/io/image_file.h"
-#include "host/viewer/camera_path.h"
+#include "host/lumigraph/camera_path.h"
 
 namespace mf {
 
@@ -22,6 +23,30 @@ void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw InputError(folder.string(), "", "cannot be made (" + error.message() + "): give another folder");
+}
+
+CameraModel of_size(const CameraModel& camera, int width, int height) {
+  const double scale = static_cast<double>(width) / camera.width;
+  CameraModel sized = camera;
+  sized.width = width;
+  sized.height = height;
+  for (std::size_t i = 0; i < 4; ++i) sized.parameters[i] *= scale;
+  sized.parameters[3] += 0.5 * (height - camera.height * scale);  // c_y: the middle stays in the middle
+  return sized;
+}
+
+// As lumigraph's read_camera_path reads it.
+void write_path(const std::filesystem::path& file, const std::vector<View>& keys, int frames) {
+  nlohmann::json views = nlohmann::json::array();
+  for (const View& view : keys) {
+    const CameraModel& c = view.camera;
+    views.push_back(
+        {{"camera_from_world", rigid3_to_json(view.cam_from_world)},
+         {"K", {{c.fx(), 0, c.cx()}, {0, c.fy(), c.cy()}, {0, 0, 1}}},
+         {"distortion", {c.parameters[4], c.parameters[5], c.parameters[6], c.parameters[7], c.parameters[8]}},
+         {"size", {c.width, c.height}}});
+  }
+  write_json_file(file, {{"frames", frames}, {"views", views}});
 }
 
 // Runs a program of PATH without a word on the terminal; 0 when there is none.
@@ -49,6 +74,8 @@ PathRecorder::~PathRecorder() {
 
 void PathRecorder::add_key(const View& view) {
   keys_.push_back(view);
+  const CameraModel& first = keys_.front().camera;
+  keys_.back().camera = of_size(view.camera, first.width, first.height);
   status_ = fmt::format("{} key views", keys_.size());
 }
 
@@ -63,9 +90,9 @@ void PathRecorder::start() {
   std::filesystem::remove_all(folder_ / "frames", absent);
   std::filesystem::remove(folder_ / "path.mp4", absent);
   make_folder(folder_ / "frames");
-  std::vector<View> path = smooth_path(keys_, frames_between_keys);
-  write_views(folder_ / "path.json", path);
-  path_ = std::move(path);
+  const int frames = frames_between_keys * (static_cast<int>(keys_.size()) - 1) + 1;
+  write_path(folder_ / "path.json", keys_, frames);
+  path_ = interpolated(keys_, frames);
   next_frame_ = 0;
 }
 

@@ -13,7 +13,7 @@
 namespace mf {
 
 // A camera path from key views to pictures, a piece of work at a time so that a window stays alive:
-//   FOLDER/path.json            the views, for `lumigraph --camera-path`
+//   FOLDER/path.json            the key views and the number of frames, for `lumigraph --camera-path`
 //   FOLDER/frames/0001.png, …   what they show
 //   FOLDER/path.mp4             the film of them, 30 a second, where ffmpeg is installed
 // A path rendered again replaces the one before.
@@ -26,6 +26,7 @@ class PathRecorder {
   PathRecorder& operator=(const PathRecorder&) = delete;
   ~PathRecorder();  // a film that is being made is given up
 
+  // Keys have the first one's size: another picture is scaled to its width, and cut or widened about its middle.
   void add_key(const View&);
   void drop_last_key();
   [[nodiscard]] const std::vector<View>& keys() const { return keys_; }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "host/lumigraph/camera_path.h"
 #include "host/lumigraph/lumigraph.h"
 #include "host/viewer/layout.h"
 #include "tests/host/viewer/viewer_photos.h"
@@ -157,8 +158,9 @@ TEST_F(LumigraphWindow, FliesWhileAKeyIsHeldAndRecordsAPath) {
   display.press("r");
   const fs::path last = folder_ / "path/frames/0031.png";
   ASSERT_TRUE(display.becomes([&](const ImageU8&) { return fs::exists(last); })) << "the path was not rendered";
-  const View first_view = read_view(folder_ / "path/path.json", 0),
-             last_view = read_view(folder_ / "path/path.json", 30);
+  const std::vector<View> path = read_camera_path(folder_ / "path/path.json");
+  ASSERT_EQ(path.size(), 31U);
+  const View &first_view = path.front(), &last_view = path.back();
   EXPECT_LT(first_view.cam_from_world.inverse().translation.norm(), 1e-6);
   const Vector3d end = last_view.cam_from_world.inverse().translation;
   EXPECT_GT(end.x(), 0.02);
