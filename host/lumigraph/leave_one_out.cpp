@@ -123,6 +123,7 @@ LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const
                           const TakeLeftOut& take, const Progress& progress) {
   const auto& sources = lumigraph.sources();
   check(sources.size() >= 2 && sources.size() == set.photos.size(), "a photo is left out of two or more");
+  LumigraphOptions blended = options;
   LumigraphOptions alone = options;
   alone.penalty.k = 1;
   LeaveOneOut result;
@@ -133,7 +134,8 @@ LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const
     for (std::uint32_t j = 0; j < sources.size(); ++j)
       if (j != i) others.push_back(j);
     const View view{sources[i].camera, sources[i].cam_from_world};
-    const LumigraphPicture foretold = lumigraph.render(view, options, others);
+    if (blended.moment && sources[i].time_s) blended.moment->time_s = *sources[i].time_s;
+    const LumigraphPicture foretold = lumigraph.render(view, blended, others);
     const std::uint32_t nearest = nearest_to(sources, i);
     const LumigraphPicture by_nearest = lumigraph.render(view, alone, {&nearest, 1});
     const Picture& photo = set.photos[i].picture;
