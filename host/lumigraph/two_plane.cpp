@@ -45,6 +45,41 @@ Rigid3 facing_frame(const PhotoSet& set) {
   return {Eigen::Quaterniond(world_from_uv), sight.centre};
 }
 
+struct Window {
+  Eigen::Vector2d centre_m;
+  Eigen::Vector2d size_m;
+};
+
+// Where the photos look: their middle rays meet the st plane at some points. Photos that turn as they move meet it at
+// one point, photos that don't meet it square to themselves: either way all see one window, and it is as large as their
+// field of view. Those that look about see more, and it grows by as much as the middle half of them looks apart.
+Window fitted_window(const PhotoSet& set, const Rigid3& uv_from_world, double st_distance_m,
+                     const std::array<double, 2>& field_of_view) {
+  constexpr double slanted = 0.5;  // least cosine: further off, a ray meets the plane far away or not at all
+  std::array<std::vector<double>, 2> at;
+  std::array<std::vector<double>, 2> from_camera;
+  for (const PosedPhoto& photo : set.photos) {
+    const auto ray = photo.camera.unproject({photo.camera.width / 2.0, photo.camera.height / 2.0});
+    if (!ray) continue;
+    const Eigen::Vector3d d = uv_from_world.rotation * (photo.cam_from_world.rotation.conjugate() * ray->normalized());
+    if (d.z() < slanted) continue;
+    const Eigen::Vector3d centre = uv_from_world * centre_of(photo);
+    const Eigen::Vector3d x = centre + (st_distance_m - centre.z()) / d.z() * d;
+    for (const std::size_t i : {0U, 1U}) {
+      at[i].push_back(x[static_cast<Eigen::Index>(i)]);
+      from_camera[i].push_back((x - centre)[static_cast<Eigen::Index>(i)]);
+    }
+  }
+  Window window{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
+  for (const std::size_t i : {0U, 1U}) {
+    const auto spread = [](const std::vector<double>& v) { return v.empty() ? 0.0 : quantile(v, 0.75) - quantile(v, 0.25); };
+    const auto axis = static_cast<Eigen::Index>(i);
+    window.size_m[axis] = st_distance_m * field_of_view[i] + std::min(spread(at[i]), spread(from_camera[i]));
+    if (!at[i].empty()) window.centre_m[axis] = median(at[i]);
+  }
+  return window;
+}
+
 double distance_to_proxy(const Lumigraph& lumigraph, const Rigid3& world_from_uv) {
   View axis;
   axis.camera.width = axis.camera.height = 1;
@@ -159,12 +194,13 @@ TwoPlane fitted_two_plane(const Lumigraph& lumigraph, const PhotoSet& set, std::
   }
   planes.world_from_uv = planes.world_from_uv * Rigid3{Eigen::Quaterniond::Identity(), middle};
   planes.st_distance_m = st_distance_m ? *st_distance_m : distance_to_proxy(lumigraph, planes.world_from_uv);
-  const double focal = median(focal_px);
-  for (const std::size_t i : {0U, 1U}) {
-    const double tangent = median(tangents[i]);
-    planes.st_size_m[static_cast<Eigen::Index>(i)] = planes.st_distance_m * tangent;
-    planes.size_px[i] = std::clamp(static_cast<int>(std::lround(focal * tangent)), 2, 8192);
-  }
+  const Window window = fitted_window(set, planes.world_from_uv.inverse(), planes.st_distance_m,
+                                      {median(tangents[0]), median(tangents[1])});
+  planes.st_centre_m = window.centre_m;
+  planes.st_size_m = window.size_m;
+  const double per_metre = median(focal_px) / planes.st_distance_m;
+  for (const std::size_t i : {0U, 1U})
+    planes.size_px[i] = std::clamp(static_cast<int>(std::lround(per_metre * window.size_m[static_cast<Eigen::Index>(i)])), 2, 8192);
   if (const auto wrong = planes.validate()) throw InputError("--two-plane", "", *wrong + " (fitted to the photos): give a layout");
   return planes;
 }

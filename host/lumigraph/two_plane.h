@@ -41,8 +41,8 @@ struct TwoPlane {
 
 // Planes that fit a lumigraph: uv through the mean of the photos' centres, square to their mean direction of sight and
 // upright as they are; as large as the middle four fifths of the centres reach; st where the mean line of sight meets
-// the proxy (or at `st_distance_m`), its window as large as the median photo's field of view there, and as finely
-// sampled as it. Throws InputError when the photos look all around or the proxy is not met: give a layout then.
+// the proxy (or at `st_distance_m`), its window as large as the median photo's field of view there and as finely
+// sampled as it; larger where photos look apart from each other. Throws InputError when the photos look all around or the proxy is not met: give a layout then.
 [[nodiscard]] TwoPlane fitted_two_plane(const Lumigraph&, const PhotoSet&, std::array<int, 2> cameras,
                                         std::optional<double> st_distance_m);
 

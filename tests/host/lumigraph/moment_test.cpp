@@ -7,10 +7,13 @@
 #include <numbers>
 #include <random>
 
+#include "common/atomic_file.h"
 #include "host/lumigraph/leave_one_out.h"
 #include "host/lumigraph/lumigraph.h"
+#include "host/lumigraph/path_times.h"
 #include "tests/host/lumigraph/made_photos.h"
 #include "tests/support/expect_input_error.h"
+#include "tests/support/temporary_folder.h"
 
 namespace mf {
 namespace {
@@ -18,8 +21,8 @@ namespace {
 constexpr double period = 2;
 
 TEST(TimeBetween, GoesRoundWithThePeriod) {
-  EXPECT_DOUBLE_EQ(time_between(0.1, 1.9, period), 0.2);
-  EXPECT_DOUBLE_EQ(time_between(1.9, 0.1, period), 0.2);
+  EXPECT_NEAR(time_between(0.1, 1.9, period), 0.2, 1e-12);
+  EXPECT_NEAR(time_between(1.9, 0.1, period), 0.2, 1e-12);
   EXPECT_NEAR(time_between(7.3, 1.3, period), 0, 1e-12);
   EXPECT_DOUBLE_EQ(time_between(0, 1, period), 1);
   EXPECT_DOUBLE_EQ(time_between(7.3, 1.3, std::numeric_limits<double>::infinity()), 6);
@@ -35,6 +38,28 @@ TEST(MomentOf, NeedsTheTimeOfEveryPhoto) {
   set.photos[1].time_s = 6;
   EXPECT_DOUBLE_EQ(moment_of(set, period, 4).penalty_per_s, 2);
   EXPECT_DOUBLE_EQ(moment_of(set, {}, 4).penalty_per_s, 0.8);
+}
+
+class PathTimes : public ::testing::Test {
+ protected:
+  std::vector<double> read(const char* text) {
+    write_file_atomically(folder_ / "path.json", text);
+    return read_path_times(folder_ / "path.json");
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(PathTimes, AreThoseOfTheViewsAndLinearBetweenKeyFrames) {
+  EXPECT_EQ(read(R"([{"time": 1}, {"time": 4}])"), (std::vector<double>{1, 4}));
+  EXPECT_EQ(read(R"({"frames": 5, "views": [{"time": 1}, {"time": 3}, {"time": 2}]})"),
+            (std::vector<double>{1, 2, 3, 2.5, 2}));
+  EXPECT_TRUE(read(R"([{}, {}])").empty());
+}
+
+TEST_F(PathTimes, AreOfAllViewsOrOfNone) {
+  const auto refused = [&](const char* text) { return test::input_error_of([&] { static_cast<void>(read(text)); }); };
+  EXPECT_TRUE(test::contains(refused(R"([{"time": 1}, {}])"), "[1].time"));
+  EXPECT_TRUE(test::contains(refused(R"({"frames": 3, "views": [{}, {"time": 1}]})"), "views[1].time"));
 }
 
 // A wall whose pattern swings from side to side, filmed by one camera that wanders before it.

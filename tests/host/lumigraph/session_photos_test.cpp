@@ -86,7 +86,7 @@ class MirrorCapture : public ::testing::Test {
   [[nodiscard]] PhotoSet photos(double scale = 1) const {
     SessionPhotoOptions options;
     options.scale = scale;
-    return photos_of_session(SessionReader(folder_ / "S"), {}, calibration_, options, {});
+    return photos_of_session(SessionReader(folder_ / "S"), linear_response(8, 0, 1, 3), calibration_, options, {});
   }
 
   test::TemporaryFolder folder_;
