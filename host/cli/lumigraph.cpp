@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -12,7 +13,9 @@
 #include "host/cli/command.h"
 #include "host/cli/session_lumigraph.h"
 #include "host/io/image_file.h"
+#include "host/lumigraph/camera_path.h"
 #include "host/lumigraph/leave_one_out.h"
+#include "host/lumigraph/path_times.h"
 #include "host/lumigraph/picture_file.h"
 #include "host/lumigraph/read_photos.h"
 #include "host/lumigraph/two_plane.h"
@@ -52,19 +55,19 @@ struct LumigraphArguments {
 };
 
 // Nothing when no time is asked for.
-std::optional<Moment> wanted_moment(const LumigraphArguments& a, const PhotoSet& set) {
-  if (!a.time && !a.period) return std::nullopt;
+std::optional<Moment> wanted_moment(const LumigraphArguments& a, const PhotoSet& set, bool path_has_times) {
+  if (!a.time && !a.period && !path_has_times) return std::nullopt;
   Moment moment = moment_of(set, a.period, a.time_penalty);
   if (a.time) moment.time_s = *a.time;
   if (const auto wrong = moment.validate()) throw InputError("lumigraph", "", *wrong);
   return moment;
 }
 
-LumigraphOptions options_of(const LumigraphArguments& a, const PhotoSet& set) {
+LumigraphOptions options_of(const LumigraphArguments& a, const PhotoSet& set, bool path_has_times = false) {
   LumigraphOptions options;
   options.penalty = {a.k, static_cast<float>(a.angle), static_cast<float>(a.resolution), static_cast<float>(a.gamma)};
   options.border = static_cast<float>(a.border);
-  options.moment = wanted_moment(a, set);
+  options.moment = wanted_moment(a, set, path_has_times);
   if (const auto wrong = options.validate()) throw InputError("lumigraph", "", *wrong);
   return options;
 }
@@ -193,14 +196,75 @@ void run_two_plane(const LumigraphArguments& a, const PhotoSet& set, const Lumig
                             planes.st_distance_m));
 }
 
+// A frame that shows nothing is a mistake of the path or the proxy, not a black picture.
+void check_shows_something(const LumigraphPicture& frame, std::size_t number, const LumigraphArguments& a) {
+  const auto& covered = frame.covered.data;
+  if (std::any_of(covered.begin(), covered.end(), [](std::uint8_t c) { return c != Covered::nothing; })) return;
+  throw InputError(a.camera_path.string(), fmt::format("frame {}", number),
+                   "shows nothing that the photos show: move it to where they look, or give another --proxy");
+}
+
+void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const Lumigraph& lumigraph,
+                     std::chrono::steady_clock::time_point start) {
+  if (a.output.empty()) throw InputError("lumigraph", "--output", "is missing: name a folder for the frames");
+  const std::vector<View> views = read_camera_path(a.camera_path);
+  const std::vector<double> times = a.time ? std::vector<double>{} : read_path_times(a.camera_path);
+  LumigraphOptions options = options_of(a, set, !times.empty());
+  const Progress progress = progress_bar();
+  make_folder(a.output);
+  double render_s = 0;
+  std::string extension;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    report_progress(progress, "frames", static_cast<double>(i) / static_cast<double>(views.size()));
+    const auto before = std::chrono::steady_clock::now();
+    if (!times.empty()) options.moment->time_s = times[i];
+    const LumigraphPicture frame = lumigraph.render(views[i], options);
+    render_s += seconds_since(before);
+    check_shows_something(frame, i, a);
+    extension = write_picture(a.output / fmt::format("{:05}", i), frame.picture).extension();
+  }
+  report_progress(progress, "frames", 1);
+  const double per_second = static_cast<double>(views.size()) / render_s;
+  const std::string pattern = (a.output / ("%05d" + extension)).string();
+  print_summary(a.json,
+                {{"frames", views.size()},
+                 {"frames_per_second", per_second},
+                 {"proxy", describe(lumigraph.proxy())},
+                 {"photos", lumigraph.sources().size()},
+                 {"pictures", pattern},
+                 {"seconds", seconds_since(start)}},
+                fmt::format("{} frames from {} photos, {:.1f} a second; proxy: {}\n{}\n"
+                            "a video: ffmpeg -framerate 30 -i {} -pix_fmt yuv420p {}.mp4\n",
+                            views.size(), lumigraph.sources().size(), per_second, describe(lumigraph.proxy()), pattern,
+                            pattern, (a.output.parent_path() / a.output.stem()).string()));
+}
+
+// Some photo must see the proxy somewhere: looked at on a grid of its picture.
+void check_proxy_is_seen(const Lumigraph& lumigraph, const LumigraphArguments& a) {
+  constexpr int steps = 8;
+  for (const Lumigraph::Source& source : lumigraph.sources())
+    for (int i = 0; i < steps * steps; ++i) {
+      const Eigen::Vector2d pixel((i % steps + 0.5) / steps * source.camera.width,
+                                  (i / steps + 0.5) / steps * source.camera.height);
+      if (lumigraph.point_at({source.camera, source.cam_from_world}, pixel)) return;
+    }
+  throw InputError("--proxy", a.proxy,
+                   "lies behind the photos or beside what they show: is it in the frame of their poses?");
+}
+
 void run(LumigraphArguments& a) {
   const auto start = std::chrono::steady_clock::now();
+  if ((a.leave_one_out ? 1 : 0) + (a.camera_path.empty() ? 0 : 1) + (a.two_plane.empty() ? 0 : 1) != 1)
+    throw InputError("lumigraph", "", "needs a task: give one of --camera-path FILE, --two-plane U,V and --leave-one-out");
   const PhotoSet set = read_photos(a);
   const Lumigraph lumigraph(set, proxy_of(a, set), visibility_of(a), progress_bar());
-  if (!a.two_plane.empty())
+  check_proxy_is_seen(lumigraph, a);
+  if (a.leave_one_out)
+    run_leave_one_out(a, set, lumigraph, start);
+  else if (!a.two_plane.empty())
     run_two_plane(a, set, lumigraph, start);
   else
-    run_leave_one_out(a, set, lumigraph, start);
+    run_camera_path(a, set, lumigraph, start);
 }
 
 }  // namespace
@@ -217,7 +281,7 @@ void add_lumigraph_command(CommandLine& program) {
                  "--session also auto (default) or a light field, NAME.lf.exr");
   command.option("--save-proxy", a->save_proxy, "OBJ file for a proxy that was found: a hull, a session's surroundings");
   command.option("--mask-below", a->mask_below, "photos without a mask: pixels whose channels are all at most this are background");
-  command.option("--camera-path", a->camera_path, "JSON of the views to make");
+  command.option("--camera-path", a->camera_path, "JSON of the views to make: a list of views, or key frames (docs/lumigraph.md)");
   command.flag("--leave-one-out", a->leave_one_out, "foretell every photo from the others, and say how well");
   command.option("--two-plane", a->two_plane, "write a two-plane light field: U,V (cameras each way), or the file of a layout");
   command.option("--st-distance", a->st_distance, "with --two-plane U,V: metres between the planes (default: where the proxy is)");

@@ -13,7 +13,7 @@ namespace mf {
 // How well a lumigraph foretells a photo from all others, for every photo in turn.
 struct LeftOutView {
   std::string name;
-  double psnr_db = 0;               // over the pixels that are seen, see Covered
+  double psnr_db = 0;               // over the pixels that are seen, see Covered, and that the photo's mask leaves
   double ssim = 0;                  // the same pixels
   double nearest_view_psnr_db = 0;  // the photo taken nearest by, alone, over what it sees
   double covered = 0;               // share of the photo's pixels that are seen

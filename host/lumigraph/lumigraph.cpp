@@ -20,7 +20,7 @@ namespace mf {
 
 namespace {
 
-constexpr float least_seen = 20 * least_sight;  // well above what hidden points keep, well below what shows
+constexpr float least_seen = 0.02F;  // far above what hidden points keep, far below what is looked at squarely
 
 template <typename T>
 void store(Image<T>& picture, std::size_t pixel, Float4 colour) {

@@ -25,8 +25,8 @@ namespace mf {
 enum class Shown { photos, blending_field };
 
 struct LumigraphOptions {
-  PenaltyOptions penalty;  // angle: of the chord at the proxy point, radians
-  float border = 0.1F;     // 0.001 to 0.5 of a photo's shorter side: width of its soft border
+  PenaltyOptions penalty{4, 1, 0.1F, 0.5F};  // angle: of the chord at the proxy point, radians
+  float border = 0.03F;    // 0.001 to 0.5 of a photo's shorter side: width of its soft border
   Shown shown = Shown::photos;
   std::optional<Moment> moment{};  // of a scene that moves; nothing: times are not looked at. Photos without one always speak
 

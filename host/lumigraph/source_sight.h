@@ -14,7 +14,7 @@ namespace mf {
 struct VisibilityOptions {
   float tolerance = 0.01F;  // of the depth, 0.0001 to 1: a point this far behind the surface that a photo sees begins to
                             // be hidden, and is hidden at twice as much
-  float silhouette = 4;     // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
+  float silhouette = 8;     // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
                             // inexact proxy puts colours of the foreground on the background
 
   [[nodiscard]] std::optional<std::string> validate() const;
@@ -41,8 +41,11 @@ struct SourceSight {
 [[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask, const Proxy&,
                                      const VisibilityOptions&);
 
-// Hidden or distrusted points keep this much weight: they speak where no photo has anything better, rather than leave
-// a hole, and are out-voted a thousand to one elsewhere. Only a mask silences a photo.
-inline constexpr float least_sight = 1e-3F;
+// Hidden points keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
+// out-voted hundreds to one elsewhere. Only a mask silences a photo.
+inline constexpr float least_sight = 2e-5F;
+// Points at silhouettes keep this much: near a silhouette of the new view every near photo has one too, and without a
+// limit photos from far around would be called instead.
+inline constexpr float least_trust = 0.05F;
 
 }  // namespace mf

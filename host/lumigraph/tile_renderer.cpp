@@ -2,6 +2,7 @@
 #include "host/lumigraph/tile_renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -19,14 +20,30 @@ constexpr std::size_t samples = 16;    // rays that stand for a region when its 
 constexpr float bound_slack = 1.03F;   // on the guess: fewer rays are ranked twice
 constexpr float same_ray = 1e-6F;      // radians: what single precision leaves of an angle of 0
 
-constexpr std::size_t block_level = 0;
-constexpr std::size_t tile_level = 1;
-constexpr std::size_t top_level = 2;
-
+// The points of a region: one sphere, or two where a silhouette parts them into near and far ones, so that neither is
+// much larger than its part of the picture.
 struct Sphere {
-  Eigen::Vector3f centre;
-  float radius;
+  Eigen::Vector3f low = Eigen::Vector3f::Constant(infinite);
+  Eigen::Vector3f high = Eigen::Vector3f::Constant(-infinite);
+
+  void add(const Eigen::Vector3f& x) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  [[nodiscard]] bool empty() const { return low.x() > high.x(); }
+  [[nodiscard]] Eigen::Vector3f centre() const { return (low + high) / 2; }
+  [[nodiscard]] float radius() const { return (high - low).norm() / 2; }
 };
+using Spheres = std::array<Sphere, 2>;
+
+Spheres spheres_of(const RayBundle& rays) {
+  const auto [nearest, farthest] = std::minmax_element(rays.depth.begin(), rays.depth.end());
+  const float middle = std::sqrt(*nearest * *farthest);
+  Spheres spheres;
+  for (std::size_t i = 0; i < rays.depth.size(); ++i)
+    spheres[rays.depth[i] > middle ? 1 : 0].add(rays.depth[i] * Eigen::Vector3f(rays.dx[i], rays.dy[i], rays.dz[i]));
+  return spheres;
+}
 
 }  // namespace
 
@@ -56,8 +73,7 @@ TileRenderer::TileRenderer(const TileFrame& frame, TakeChosen take)
       take_(std::move(take)),
       focal2_(static_cast<float>(frame.view.camera.fx() * frame.view.camera.fy())),
       plain_camera_(!frame.view.camera.has_distortion()),
-      levels_(3) {
-  levels_[top_level] = {{frame.speaking.begin(), frame.speaking.end()}, infinite};
+      all_{{frame.speaking.begin(), frame.speaking.end()}, infinite} {
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   least_penalty_.resize(entries);
   least_candidate_.resize(entries);
@@ -69,12 +85,12 @@ TileRenderer::TileRenderer(const TileFrame& frame, TakeChosen take)
 void TileRenderer::render(int x0, int y0) {
   shoot(x0, y0);
   if (rays_.size() == 0) return;
-  narrow(levels_[top_level], {0, rays_.size()}, rays_.size() / samples, levels_[tile_level]);
+  narrow(all_, {0, rays_.size()}, of_tile_);
   for (const Region& block : blocks_) {
     if (block.first == block.end) continue;
-    narrow(levels_[tile_level], block, (block.end - block.first) / samples, levels_[block_level]);
+    narrow(of_tile_, block, of_block_);
     for (std::size_t first = block.first; first < block.end; first += largest_bundle)
-      choose(rays_, {first, std::min(block.end, first + largest_bundle)}, block_level);
+      choose(rays_, {first, std::min(block.end, first + largest_bundle)}, of_block_);
   }
 }
 
@@ -120,72 +136,96 @@ void TileRenderer::shoot_block(int x0, int y0, int x1, int y1) {
   blocks_.push_back({first, kept});
 }
 
-// `stride` between the samples; the last ray is one too, since the corners of a region differ most.
-void TileRenderer::narrow(const Candidates& from, const Region& region, std::size_t stride, Candidates& to) {
-  Rays picked;
-  picked.resize(samples);
-  const std::size_t last = region.end - 1;
-  for (std::size_t i = 0; i + 1 < samples; ++i) picked.copy(std::min(region.first + i * stride, last), rays_, i);
-  picked.copy(last, rays_, samples - 1);
-
-  Eigen::Vector3f low = Eigen::Vector3f::Constant(infinite);
-  Eigen::Vector3f high = -low;
-  for (std::size_t i = region.first; i < region.end; ++i) {
-    const Eigen::Vector3f x = rays_.depth[i] * Eigen::Vector3f(rays_.dx[i], rays_.dy[i], rays_.dz[i]);
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
-  }
-  const Sphere sphere{(low + high) / 2, (high - low).norm() / 2};
-
-  to.views.clear();
-  std::vector<float> least_of;
+void TileRenderer::bound_from_below(const Rays& rays, const Region& region, const Candidates& from, Candidates& to) {
+  const Spheres spheres = spheres_of(rays.bundle(region.first, region.end - region.first, focal2_));
+  least_.clear();
   for (const std::uint32_t view : from.views) {
-    const float least = least_penalty(frame_.views[view], sphere.centre, sphere.radius, frame_.options.penalty);
-    if (least == infinite) continue;
-    to.views.push_back(view);
-    least_of.push_back(least);
+    float least = infinite;
+    for (const Sphere& sphere : spheres)
+      if (!sphere.empty())
+        least = std::min(least, least_penalty(frame_.views[view], sphere.centre(), sphere.radius(), frame_.options.penalty));
+    if (least < infinite) least_.emplace_back(least, view);
   }
-  rank(picked.bundle(0, samples, focal2_), to.views);
-  const float* worst = least_penalty_.data() + static_cast<std::size_t>(frame_.options.penalty.k) * samples;
-  to.bound = std::min(from.bound, bound_slack * *std::max_element(worst, worst + samples));
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < to.views.size(); ++i)
-    if (least_of[i] < to.bound) to.views[kept++] = to.views[i];
-  to.views.resize(kept);
+  to.views.clear();
 }
 
-void TileRenderer::rank(const RayBundle& bundle, const std::vector<std::uint32_t>& views) {
+void TileRenderer::narrow(const Candidates& from, const Region& region, Candidates& to) {
+  Rays picked;
+  picked.resize(samples);
+  for (std::size_t i = 0; i < samples; ++i)
+    picked.copy(region.first + i * (region.end - 1 - region.first) / (samples - 1), rays_, i);
+  const RayBundle bundle = picked.bundle(0, samples, focal2_);
+  bound_from_below(rays_, region, from, to);
+  start_ranking(samples);
+
+  // The likely best first: what they leave as bound spares most of the others.
+  const auto k = static_cast<std::size_t>(frame_.options.penalty.k);
+  const std::size_t likely = std::min(least_.size(), 4 * (k + 1));
+  std::nth_element(least_.begin(), least_.begin() + static_cast<std::ptrdiff_t>(likely), least_.end());
+  const auto rank_some = [&](std::size_t first, std::size_t end, float below) {
+    const std::size_t before = to.views.size();
+    for (std::size_t i = first; i < end; ++i)
+      if (least_[i].first < below) to.views.push_back(least_[i].second);
+    rank(bundle, std::span(to.views).subspan(before), before);
+    return bound_slack * *std::max_element(least_penalty_.begin() + static_cast<std::ptrdiff_t>(k * samples),
+                                           least_penalty_.begin() + static_cast<std::ptrdiff_t>((k + 1) * samples));
+  };
+  const float first_bound = std::min(from.bound, rank_some(0, likely, infinite));
+  to.bound = std::min(from.bound, rank_some(likely, least_.size(), first_bound));
+  to.views.clear();
+  for (const auto& [least, view] : least_)
+    if (least < to.bound) to.views.push_back(view);
+}
+
+void TileRenderer::start_ranking(std::size_t rays) {
+  clear({least_penalty_, least_candidate_, rays, frame_.options.penalty.k});
+}
+
+void TileRenderer::rank(const RayBundle& bundle, std::span<const std::uint32_t> views, std::size_t first_candidate) {
   const std::size_t count = bundle.dx.size();
   const LeastPenalties least{least_penalty_, least_candidate_, count, frame_.options.penalty.k};
-  clear(least);
+  const std::size_t needed = (first_candidate + views.size()) * count;
   for (auto* values : {&answers_x_, &answers_y_, &answers_lod_, &answers_weight_, &answers_penalty_})
-    if (values->size() < views.size() * count) values->resize(views.size() * count);
-  for (std::size_t c = 0; c < views.size(); ++c) {
+    if (values->size() < needed) values->resize(needed);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const std::size_t c = first_candidate + i;
     const auto row = [&](std::vector<float>& values) { return std::span(values).subspan(c * count, count); };
-    const RayAnswers answers{row(answers_x_), row(answers_y_), row(answers_lod_), row(answers_weight_), row(answers_penalty_)};
-    answer(frame_.views[views[c]], bundle, frame_.options.penalty, frame_.depth_tolerance, answers);
+    const RayAnswers answers{row(answers_x_), row(answers_y_), row(answers_lod_), row(answers_weight_),
+                             row(answers_penalty_)};
+    answer(frame_.views[views[i]], bundle, frame_.options.penalty, frame_.depth_tolerance, answers);
     add_candidate(least, static_cast<std::int32_t>(c), answers.penalty);
   }
 }
 
-void TileRenderer::choose(const Rays& rays, const Region& region, std::size_t level) {
+void TileRenderer::choose(const Rays& rays, const Region& region, const Candidates& candidates) {
   const std::size_t count = region.end - region.first;
-  rank(rays.bundle(region.first, count, focal2_), levels_[level].views);
+  start_ranking(count);
+  rank(rays.bundle(region.first, count, focal2_), candidates.views, 0);
   const float* worst = least_penalty_.data() + static_cast<std::size_t>(frame_.options.penalty.k) * count;
   Rays again;
+  float bound = 0;
   for (std::size_t i = 0; i < count; ++i) {
     pixel_[i] = rays.pixel[region.first + i];
-    if (worst[i] <= levels_[level].bound) continue;
+    if (worst[i] <= candidates.bound) continue;
     again.resize(again.size() + 1);
     again.copy(region.first + i, rays, again.size() - 1);
+    bound = std::max(bound, worst[i]);
     pixel_[i] = -1;
   }
-  hand_on(rays, region, levels_[level]);
-  if (again.size() > 0) choose(again, {0, again.size()}, level + 1);
+  hand_on(count, candidates);
+  if (again.size() > 0) choose_again(again, bound);
 }
 
-void TileRenderer::hand_on(const Rays&, const Region& region, const Candidates& candidates) {
-  const std::size_t count = region.end - region.first;
+// No photo whose penalty is `bound` or more can be among a ray's k + 1 best: it has as many below already.
+void TileRenderer::choose_again(const Rays& rays, float bound) {
+  bound_from_below(rays, {0, rays.size()}, bound <= of_tile_.bound ? of_tile_ : all_, again_);
+  for (const auto& [least, view] : least_)
+    if (least <= bound) again_.views.push_back(view);
+  again_.bound = infinite;
+  choose(rays, {0, rays.size()}, again_);
+}
+
+void TileRenderer::hand_on(std::size_t count, const Candidates& candidates) {
   const auto k = static_cast<std::size_t>(frame_.options.penalty.k);
   for (std::size_t i = 0; i < count; ++i) {
     const float threshold = least_penalty_[k * count + i];

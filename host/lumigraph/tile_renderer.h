@@ -39,8 +39,8 @@ inline constexpr int tile_side = 64;  // pixels
 // Chooses the photos for the pixels of one tile after another. It holds the working memory: one a thread.
 //
 // Photos are ranked for the tile, then for each block of it. What is dropped for a region is a photo whose penalty is
-// nowhere there below `bound`; a ray whose k + 1 best are not all below the bound is ranked again among the photos of
-// the larger region, so that every ray gets what ranking all photos would have given it.
+// nowhere there below `bound`. A ray whose k + 1 best are not all below the bound is ranked again, among all photos that
+// could be better than its (k + 1)-th: so every ray gets what ranking all photos would have given it.
 class TileRenderer {
  public:
   TileRenderer(const TileFrame&, TakeChosen);
@@ -69,10 +69,14 @@ class TileRenderer {
 
   void shoot(int x0, int y0);
   void shoot_block(int x0, int y0, int x1, int y1);
-  void narrow(const Candidates& from, const Region&, std::size_t stride, Candidates& to);
-  void choose(const Rays&, const Region&, std::size_t level);
-  void rank(const RayBundle&, const std::vector<std::uint32_t>& views);
-  void hand_on(const Rays&, const Region&, const Candidates&);
+  // Fills least_ with what each of the candidates can have at best on the rays; drops those out of sight.
+  void bound_from_below(const Rays&, const Region&, const Candidates& from, Candidates& to);
+  void narrow(const Candidates& from, const Region&, Candidates& to);
+  void choose(const Rays&, const Region&, const Candidates&);
+  void choose_again(const Rays&, float bound);
+  void start_ranking(std::size_t rays);
+  void rank(const RayBundle&, std::span<const std::uint32_t> views, std::size_t first_candidate);
+  void hand_on(std::size_t rays, const Candidates&);
 
   const TileFrame& frame_;
   TakeChosen take_;
@@ -81,7 +85,9 @@ class TileRenderer {
 
   Rays rays_;                    // of the tile, block by block
   std::vector<Region> blocks_;   // of the rays
-  std::vector<Candidates> levels_;  // of the block, of the tile, all
+  Candidates all_;
+  Candidates of_tile_, of_block_, again_;
+  std::vector<std::pair<float, std::uint32_t>> least_;  // a photo's least penalty in a region, and the photo
   std::vector<float> answers_x_, answers_y_, answers_lod_, answers_weight_, answers_penalty_;  // a row a candidate
   std::vector<float> least_penalty_;
   std::vector<std::int32_t> least_candidate_;
