@@ -119,10 +119,21 @@ double ssim(const Picture& picture, const Picture& truth, const ImageU8& where) 
   return count == 0 ? 0 : sum / static_cast<double>(count);
 }
 
+namespace {
+
+// What a photo's own mask leaves out is not compared: the frame about a mirror, a background.
+void leave_to_mask(const ImageU8& mask, ImageU8& covered) {
+  for (std::size_t i = 0; i < mask.data.size(); ++i)
+    if (mask.data[i] < 128) covered.data[i] = Covered::nothing;
+}
+
+}  // namespace
+
 LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const LumigraphOptions& options,
                           const TakeLeftOut& take, const Progress& progress) {
   const auto& sources = lumigraph.sources();
   check(sources.size() >= 2 && sources.size() == set.photos.size(), "a photo is left out of two or more");
+  LumigraphOptions blended = options;
   LumigraphOptions alone = options;
   alone.penalty.k = 1;
   LeaveOneOut result;
@@ -133,9 +144,12 @@ LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const
     for (std::uint32_t j = 0; j < sources.size(); ++j)
       if (j != i) others.push_back(j);
     const View view{sources[i].camera, sources[i].cam_from_world};
-    const LumigraphPicture foretold = lumigraph.render(view, options, others);
+    if (blended.moment && sources[i].time_s) blended.moment->time_s = *sources[i].time_s;
+    LumigraphPicture foretold = lumigraph.render(view, blended, others);
     const std::uint32_t nearest = nearest_to(sources, i);
-    const LumigraphPicture by_nearest = lumigraph.render(view, alone, {&nearest, 1});
+    LumigraphPicture by_nearest = lumigraph.render(view, alone, {&nearest, 1});
+    leave_to_mask(set.photos[i].mask, foretold.covered);
+    leave_to_mask(set.photos[i].mask, by_nearest.covered);
     const Picture& photo = set.photos[i].picture;
     const double pixels = static_cast<double>(foretold.covered.data.size());
     const auto covered = std::count_if(foretold.covered.data.begin(), foretold.covered.data.end(), [](auto v) { return v == Covered::seen; });

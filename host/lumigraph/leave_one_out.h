@@ -13,7 +13,7 @@ namespace mf {
 // How well a lumigraph foretells a photo from all others, for every photo in turn.
 struct LeftOutView {
   std::string name;
-  double psnr_db = 0;               // over the pixels that are seen, see Covered
+  double psnr_db = 0;               // over the pixels that are seen, see Covered, and that the photo's mask leaves
   double ssim = 0;                  // the same pixels
   double nearest_view_psnr_db = 0;  // the photo taken nearest by, alone, over what it sees
   double covered = 0;               // share of the photo's pixels that are seen
@@ -33,7 +33,7 @@ struct LeftOutPictures {
 using TakeLeftOut = std::function<void(const LeftOutView&, const LeftOutPictures&)>;
 
 // PSNR = −10 log₁₀ of the mean squared difference of all channels, 8-bit codes as 0…1; linear pictures relative to their
-// photo's largest value. `take` gets each result as it comes; may be empty.
+// photo's largest value. Where the options have a moment, each photo is foretold for its own. `take` gets each result as it comes; may be empty.
 [[nodiscard]] LeaveOneOut leave_one_out(const Lumigraph&, const PhotoSet&, const LumigraphOptions&, const TakeLeftOut& = {},
                                         const Progress& = {});
 

@@ -89,6 +89,8 @@ void render_tiles(const TileFrame& frame, const TakeChosen& take) {
 
 std::optional<std::string> LumigraphOptions::validate() const {
   if (auto wrong = penalty.validate()) return wrong;
+  if (moment)
+    if (auto wrong = moment->validate()) return wrong;
   if (!(border >= 0.001F && border <= 0.5F)) return "border: must be between 0.001 and 0.5 of a photo's shorter side";
   return std::nullopt;
 }
@@ -119,10 +121,15 @@ void Lumigraph::look_at_proxy(const Progress& progress) {
   });
 }
 
-std::vector<AnsweringView> Lumigraph::views_from(const Eigen::Vector3d& eye, float border) const {
+std::vector<AnsweringView> Lumigraph::views_from(const Eigen::Vector3d& eye, const LumigraphOptions& options) const {
   std::vector<AnsweringView> views(sources_.size());
-  for (std::size_t i = 0; i < views.size(); ++i)
-    views[i] = answering_view(cameras_[i], sources_[i].cam_from_world, sights_[i], eye, border);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i] = answering_view(cameras_[i], sources_[i].cam_from_world, sights_[i], eye, options.border);
+    const std::optional<double>& taken = sources_[i].time_s;
+    if (const auto& moment = options.moment; moment && taken)
+      views[i].time_penalty =
+          static_cast<float>(moment->penalty_per_s * time_between(moment->time_s, *taken, moment->period_s));
+  }
   return views;
 }
 
@@ -140,7 +147,7 @@ LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& opt
                                    std::span<const std::uint32_t> views) const {
   check(!options.validate(), "the lumigraph's options are valid");
   const std::vector<AnsweringView> answering =
-      views_from(view.cam_from_world.inverse().translation, options.border);
+      views_from(view.cam_from_world.inverse().translation, options);
   const std::vector<std::uint32_t> may_speak = speaking(views);
   const TileFrame frame{view, proxy_, options, visibility_.tolerance, answering, may_speak};
   const int width = view.camera.width;
@@ -171,7 +178,7 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
   one.camera.parameters[2] -= pixel.x() - 0.5;
   one.camera.parameters[3] -= pixel.y() - 0.5;
   const std::vector<AnsweringView> answering =
-      views_from(view.cam_from_world.inverse().translation, options.border);
+      views_from(view.cam_from_world.inverse().translation, options);
   const std::vector<std::uint32_t> may_speak = speaking(views);
   std::vector<ViewWeight> weights;
   const auto take = [&](const ChosenViews& chosen) {

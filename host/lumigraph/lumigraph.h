@@ -11,6 +11,7 @@
 #include "host/blending/ray_penalty.h"
 #include "host/blending/view_weights.h"
 #include "host/io/view.h"
+#include "host/lumigraph/moment.h"
 #include "host/lumigraph/photo_pyramid.h"
 #include "host/lumigraph/posed_photo.h"
 #include "host/lumigraph/proxy.h"
@@ -27,6 +28,7 @@ struct LumigraphOptions {
   PenaltyOptions penalty{4, 1, 0.1F, 0.5F};  // angle: of the chord at the proxy point, radians
   float border = 0.03F;    // 0.001 to 0.5 of a photo's shorter side: width of its soft border
   Shown shown = Shown::photos;
+  std::optional<Moment> moment{};  // of a scene that moves; nothing: times are not looked at. Photos without one always speak
 
   // What is wrong, in words that name the field; nothing when all is well.
   [[nodiscard]] std::optional<std::string> validate() const;
@@ -80,7 +82,7 @@ class Lumigraph {
 
  private:
   void look_at_proxy(const Progress&);
-  [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, float border) const;
+  [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, const LumigraphOptions&) const;
   [[nodiscard]] std::vector<std::uint32_t> speaking(std::span<const std::uint32_t> views) const;
 
   std::vector<Source> sources_;

@@ -9,6 +9,7 @@
 #include "host/io/exr.h"
 #include "host/io/image_file.h"
 #include "host/io/jpeg_image.h"
+#include "host/io/png_image.h"
 
 namespace mf {
 
@@ -53,6 +54,15 @@ ImageU8 read_mask(const std::filesystem::path& path) {
   return mask;
 }
 
+ImageU8 read_alpha(const std::filesystem::path& path) {
+  const std::string bytes = read_file_bytes(path);
+  if (!bytes.starts_with("\x89PNG")) return {};
+  std::optional<ImageU8> alpha = decode_png_alpha(bytes, path.string());
+  const auto says_something = [](std::uint8_t value) { return value != 255; };
+  if (!alpha || std::none_of(alpha->data.begin(), alpha->data.end(), says_something)) return {};
+  return std::move(*alpha);
+}
+
 std::filesystem::path write_picture(const std::filesystem::path& stem, const Picture& picture) {
   std::filesystem::path file = stem;
   if (const auto* codes = std::get_if<ImageU8>(&picture)) {
@@ -68,7 +78,7 @@ std::filesystem::path write_picture(const std::filesystem::path& stem, const Pic
 void read_pictures(const std::vector<PhotoFiles>& files, std::vector<PosedPhoto>& photos) {
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
     photos[i].picture = read_picture(files[i].picture);
-    if (!files[i].mask.empty()) photos[i].mask = read_mask(files[i].mask);
+    photos[i].mask = files[i].mask.empty() ? read_alpha(files[i].picture) : read_mask(files[i].mask);
   });
 }
 

@@ -14,10 +14,13 @@ namespace mf {
 // One channel, 8 bits: the first of the file's.
 [[nodiscard]] ImageU8 read_mask(const std::filesystem::path&);
 
+// The alpha of a PNG, where it has one and it is not 255 everywhere: as a mask, 0 says nothing. Empty otherwise.
+[[nodiscard]] ImageU8 read_alpha(const std::filesystem::path&);
+
 // 8-bit codes as PNG, linear floats as EXR: `stem` gets the extension. Returns the file.
 std::filesystem::path write_picture(const std::filesystem::path& stem, const Picture&);
 
-// Reads the pictures (and masks) of photos, several at once. A mask file that is empty is none.
+// Reads the pictures (and masks) of photos, several at once. Without a mask file a picture's alpha is its mask.
 struct PhotoFiles {
   std::filesystem::path picture;
   std::filesystem::path mask;

@@ -15,6 +15,7 @@
 #include "common/dense.h"
 #include "common/error.h"
 #include "common/file_bytes.h"
+#include "host/lumigraph/visual_hull.h"
 
 namespace mf {
 
@@ -162,12 +163,23 @@ Proxy make_tunnel(const std::string& name, const std::vector<double>& numbers, c
   return box;
 }
 
+Proxy make_hull(const std::string& name, const std::vector<double>& numbers, const PhotoSet& set) {
+  if (numbers.size() > 1 && numbers.size() != 7)
+    throw InputError("--proxy", name, "takes a number of cells, and a box if it needs one: hull:N,x0,y0,z0,x1,y1,z1");
+  HullOptions options;
+  if (!numbers.empty()) options.resolution = static_cast<int>(std::clamp(numbers[0], 0.0, 1e6));
+  if (numbers.size() == 7)
+    options.box = {Eigen::Vector3d(numbers[1], numbers[2], numbers[3]), Eigen::Vector3d(numbers[4], numbers[5], numbers[6])};
+  if (const auto wrong = options.validate()) throw InputError("--proxy", name, *wrong);
+  return MeshProxy(visual_hull(set, options));
+}
+
 Proxy make_mesh(const std::string& name, const fs::path& folder) {
   fs::path file = name;
   if (!fs::exists(file) && file.is_relative() && fs::exists(folder / file)) file = folder / file;
   if (!fs::exists(file))
     throw InputError("--proxy", name,
-                     "is no proxy and no file: give plane, plane:D, sphere:R, box, tunnel:W,H or a mesh");
+                     "is no proxy and no file: give plane, plane:D, sphere:R, box, tunnel:W,H, hull or a mesh");
   TriangleMesh mesh = read_mesh(file);
   const fs::path similarity = file.parent_path() / (file.stem().string() + "_to_pose_similarity.npy");
   if (fs::exists(similarity)) mesh = moved_by_similarity(std::move(mesh), similarity);
@@ -224,13 +236,14 @@ TriangleMesh moved_by_similarity(TriangleMesh mesh, const fs::path& npy) {
 Proxy make_proxy(const std::string& name, const PhotoSet& set, const fs::path& folder) {
   const std::size_t colon = name.find(':');
   const std::string kind = name.substr(0, colon);
-  const bool known = kind == "plane" || kind == "sphere" || kind == "box" || kind == "tunnel";
+  const bool known = kind == "plane" || kind == "sphere" || kind == "box" || kind == "tunnel" || kind == "hull";
   if (!known || fs::exists(name)) return make_mesh(name, folder);
   const std::vector<double> numbers =
       colon == std::string::npos ? std::vector<double>{} : numbers_in(name, std::string_view(name).substr(colon + 1));
   if (kind == "plane") return make_plane(name, numbers, set);
   if (kind == "sphere") return make_sphere(name, numbers, set);
   if (kind == "box") return make_box(name, numbers, set);
+  if (kind == "hull") return make_hull(name, numbers, set);
   return make_tunnel(name, numbers, set);
 }
 

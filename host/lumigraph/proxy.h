@@ -35,9 +35,11 @@ struct BoxProxy {
 };
 
 struct MeshProxy {
-  explicit MeshProxy(TriangleMesh m) : mesh(std::move(m)), scene(mesh) {}
+  explicit MeshProxy(TriangleMesh m, bool surrounds_views = false)
+      : mesh(std::move(m)), scene(mesh), surrounds(surrounds_views) {}
   TriangleMesh mesh;
   RayScene scene;
+  bool surrounds;  // the views: a ray meets the wall that it crosses last, as with the sphere and the box
 };
 
 using Proxy = std::variant<PlaneProxy, SphereProxy, BoxProxy, MeshProxy>;
@@ -50,6 +52,8 @@ using Proxy = std::variant<PlaneProxy, SphereProxy, BoxProxy, MeshProxy>;
 //   box                 the box of the set's points and the centres, axes of the world
 //   box:x0,y0,z0,x1,y1,z1
 //   tunnel:W,H[,D]      W wide and H high about the mean line of sight, closed at distance D or not at all
+//   hull[:N[,x0,...]]   the visual hull of the photos' masks (visual_hull.h), N cells (128) along its longest side; the
+//                       box that holds it is found, or given by its corners x0,y0,z0,x1,y1,z1
 //   FILE                a mesh: OBJ, PLY, glTF; a relative path that is not in the working directory is looked for in
 //                       `folder`, the photos'. When STEM_to_pose_similarity.npy lies beside the mesh, it is applied.
 // Throws InputError naming what is wrong and what else to give.

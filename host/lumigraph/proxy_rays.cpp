@@ -3,6 +3,7 @@
 
 #include <embree3/rtcore.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -81,17 +82,25 @@ void trace_packet(const MeshProxy& proxy, const ProxyRays& rays, std::size_t fir
   RTCIntersectContext context = coherent_context();
   alignas(64) RTCRayHit16 hit;
   alignas(64) int valid[packet];
+  // From inside, a ray is traced backwards from beyond the mesh: what it meets first is what it crosses last.
+  const Bounds& bounds = proxy.scene.bounds();
+  const float beyond = proxy.surrounds ? (rays.origin - bounds.centre).norm() + 1.01F * bounds.radius : 0.0F;
+  std::array<float, packet> back{};  // where each starts, in lengths of its direction
   for (std::size_t i = 0; i < packet; ++i) {
     valid[i] = i < count ? -1 : 0;
     const std::size_t at = first + std::min(i, count - 1);
-    hit.ray.org_x[i] = rays.origin.x();
-    hit.ray.org_y[i] = rays.origin.y();
-    hit.ray.org_z[i] = rays.origin.z();
-    hit.ray.dir_x[i] = rays.dx[at];
-    hit.ray.dir_y[i] = rays.dy[at];
-    hit.ray.dir_z[i] = rays.dz[at];
+    const Eigen::Vector3f d(rays.dx[at], rays.dy[at], rays.dz[at]);
+    if (proxy.surrounds) back[i] = beyond / d.norm();
+    const Eigen::Vector3f from = rays.origin + back[i] * d;
+    const Eigen::Vector3f along = proxy.surrounds ? Eigen::Vector3f(-d) : d;
+    hit.ray.org_x[i] = from.x();
+    hit.ray.org_y[i] = from.y();
+    hit.ray.org_z[i] = from.z();
+    hit.ray.dir_x[i] = along.x();
+    hit.ray.dir_y[i] = along.y();
+    hit.ray.dir_z[i] = along.z();
     hit.ray.tnear[i] = 0;
-    hit.ray.tfar[i] = no_hit;
+    hit.ray.tfar[i] = proxy.surrounds ? back[i] : no_hit;
     hit.ray.time[i] = 0;
     hit.ray.mask[i] = ~0U;
     hit.ray.flags[i] = 0;
@@ -102,7 +111,7 @@ void trace_packet(const MeshProxy& proxy, const ProxyRays& rays, std::size_t fir
     const bool met = hit.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     const Eigen::Vector3f n = met ? shading_normal(proxy.mesh, hit.hit.primID[i], hit.hit.u[i], hit.hit.v[i])
                                   : Eigen::Vector3f::UnitZ();
-    rays.distance[first + i] = met ? hit.ray.tfar[i] : no_hit;
+    rays.distance[first + i] = !met ? no_hit : proxy.surrounds ? back[i] - hit.ray.tfar[i] : hit.ray.tfar[i];
     rays.nx[first + i] = n.x();
     rays.ny[first + i] = n.y();
     rays.nz[first + i] = n.z();

@@ -93,7 +93,7 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
     out_x[i] = u;
     out_y[i] = w;
     out_lod[i] = std::max(-octaves, 0.0F);
-    out_plain[i] = o.angle * chord + o.resolution * std::max(octaves, 0.0F);
+    out_plain[i] = o.angle * chord + o.resolution * std::max(octaves, 0.0F) + v.time_penalty;
     inverse_depth[i] = inverse;
     weight[i] = inside ? border : 0.0F;
   }
@@ -255,13 +255,13 @@ float least_penalty(const AnsweringView& view, const Eigen::Vector3f& centre, fl
   const float to_eye = centre.norm();
   const float nearest_view = to_view - radius;
   const float nearest_eye = to_eye - radius;
-  if (!(nearest_view > 0 && nearest_eye > 0)) return 0;
+  if (!(nearest_view > 0 && nearest_eye > 0)) return view.time_penalty;
   // The chord u − v changes with X at a rate of at most |1/|X−C| − 1/|X−E|| + |u − v| / max(|X−C|, |X−E|).
   const float chord = (from_centre / to_view - centre / to_eye).norm();
   const float largest_chord = std::min(2.0F, chord + 2 * radius / std::min(nearest_view, nearest_eye));
   const float rate = (std::abs(to_view - to_eye) + radius * largest_chord) / (nearest_view * nearest_eye) +
                      largest_chord / std::max(nearest_view, nearest_eye);
-  return options.angle * std::max(0.0F, chord - radius * rate);
+  return options.angle * std::max(0.0F, chord - radius * rate) + view.time_penalty;
 }
 
 void clear(const LeastPenalties& least) {

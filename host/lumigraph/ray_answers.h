@@ -42,6 +42,7 @@ struct AnsweringView {
   std::array<float, 3> eye_in_cam{};       // E in the photo's frame
   std::array<float, 3> eye_from_centre{};  // E − C, world
   float per_border_px = 1;                 // 1 / width of the soft border
+  float time_penalty = 0;                  // ≥ 0, before it is divided by the weight: taken at another time, see Moment
   const SourceSight* sight = nullptr;      // none: the photo shows whatever lies in its picture
 };
 

@@ -70,7 +70,8 @@ ImageF distance_to_jumps(const ImageF& inverse, float reach) {
 }
 
 bool hides_itself(const Proxy& proxy) {
-  return std::holds_alternative<MeshProxy>(proxy);
+  const auto* mesh = std::get_if<MeshProxy>(&proxy);
+  return mesh != nullptr && !mesh->surrounds;
 }
 
 std::uint16_t code(float value) {

@@ -142,7 +142,7 @@ const std::vector<FolderRule>& include_table() {
       {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree"}},
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
-      {"host/lumigraph/", stage_headers, stage_libraries + Names{"GL", "Embree"}},
+      {"host/lumigraph/", stage_headers + Names{"host/calibration/calibration.h"}, stage_libraries + Names{"GL", "Embree"}},
       {"host/report/", stage_headers + records, stage_libraries},
       // It shows what two stages give, and lets a hand ask them for more.
       {"host/viewer/",
