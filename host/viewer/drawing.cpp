@@ -16,6 +16,8 @@ Panel::Panel(const Window& window, std::string keys) : window_(window), keys_(st
   ImGui::SetNextWindowSize({static_cast<float>(panel_width_px), static_cast<float>(window.height())});
   ImGui::Begin("panel", nullptr, ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove);
   ImGui::PushTextWrapPos();
+  constexpr float slider_width_px = 180;  // leaves room for the longest name
+  ImGui::PushItemWidth(slider_width_px);
 }
 
 Panel::~Panel() {
@@ -23,6 +25,7 @@ Panel::~Panel() {
   ImGui::TextUnformatted(keys_.c_str());
   ImGui::TextUnformatted("F12: screenshot    Ctrl+Q: close");
   ImGui::TextUnformatted(window_.notice().c_str());
+  ImGui::PopItemWidth();
   ImGui::PopTextWrapPos();
   ImGui::End();
 }

@@ -27,15 +27,9 @@ class LumigraphWindow {
   void run() {
     while (window_.begin_frame()) {
       box_ = fitted(picture_room(window_.width(), window_.height()), view_.aspect());
-      const Panel panel(window_,
-                        "Drag: orbit    right: turn    middle: shift\nwheel: nearer    Shift+wheel: focus\n"
-                        "W A S D Q E: fly    B: blending field\nP: face the plane    K: key view    R: render path");
-      draw_settings();
       take_pointer();
       take_keys();
-      draw_weights();
-      draw_path();
-      draw_photos();
+      draw_panel();
       draw_picture();
       window_.end_frame();
     }
@@ -112,6 +106,16 @@ class LumigraphWindow {
     window_.hurry();
   }
 
+  void draw_panel() {
+    const Panel panel(window_,
+                      "Drag: orbit    right: turn    middle: shift\nwheel: nearer    Shift+wheel: focus\n"
+                      "W A S D Q E: fly    B: blending field\nP: face the plane    K: key view    R: render path");
+    draw_settings();
+    draw_weights();
+    draw_path();
+    draw_photos();
+  }
+
   void draw_settings() {
     LumigraphOptions options = view_.options();
     bool field = options.shown == Shown::blending_field;
@@ -163,6 +167,8 @@ class LumigraphWindow {
       const std::vector<ViewWeight> weights = view_.weights_at(*position_);
       if (weights.empty()) ImGui::TextUnformatted("no photo shows this");
       for (const ViewWeight& w : weights) {
+        constexpr float least_shown = 0.0005F;  // would read 0.0 %
+        if (w.weight < least_shown) continue;
         ImGui::PushID(static_cast<int>(w.view));
         swatch(w.view);
         ImGui::TextUnformatted(
