@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <numbers>
@@ -85,7 +86,7 @@ class LumigraphWindow {
 
   void take_keys() {
     if (window_.pressed('B')) toggle_blending_field();
-    if (window_.pressed('K')) recorder_.add_key(view_.view(box_.width));
+    if (window_.pressed('K')) recorder_.add_key(view_.view(full_width()));
     if (window_.pressed('P') && view_.has_focus()) {
       view_.face_plane();
       changed();
@@ -164,7 +165,7 @@ class LumigraphWindow {
     constexpr float lines_height_px = 120;
     ImGui::BeginChild("weights", {0, lines_height_px});
     if (position_) {
-      const std::vector<ViewWeight> weights = view_.weights_at(*position_);
+      const std::vector<ViewWeight> weights = view_.weights_at(*position_, full_width());
       if (weights.empty()) ImGui::TextUnformatted("no photo shows this");
       for (const ViewWeight& w : weights) {
         constexpr float least_shown = 0.0005F;  // would read 0.0 %
@@ -181,7 +182,7 @@ class LumigraphWindow {
 
   void draw_path() {
     ImGui::Separator();
-    if (ImGui::Button("add key view")) recorder_.add_key(view_.view(box_.width));
+    if (ImGui::Button("add key view")) recorder_.add_key(view_.view(full_width()));
     ImGui::SameLine();
     ImGui::BeginDisabled(recorder_.keys().empty());
     if (ImGui::Button("drop last")) recorder_.drop_last_key();
@@ -226,16 +227,20 @@ class LumigraphWindow {
     ImGui::EndChild();
   }
 
+  // Of a picture at rest, pixels.
+  [[nodiscard]] int full_width() const { return std::min(box_.width, view_.largest_width_px()); }
+
   // While something moves, pictures are as large as time allows; then one of full size.
   void draw_picture() {
-    if (box_.width != rendered_width_) full_size_waits_ = true;
+    if (full_width() != rendered_width_) full_size_waits_ = true;
     if (moved_ || full_size_waits_) {
       const int divisor = moved_ ? pace_.divisor() : 1;
       const auto start = std::chrono::steady_clock::now();
-      picture_.set(view_.render(view_.view(std::max(1, box_.width / divisor)), static_cast<double>(stops_)));
+      const View view = view_.view(std::max(1, full_width() / divisor));
+      picture_.set(view_.render(view, static_cast<double>(stops_)), ShownPicture::Enlarged::smooth);
       pace_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), divisor);
       full_size_waits_ = divisor > 1;
-      rendered_width_ = box_.width;
+      rendered_width_ = full_width();
       if (full_size_waits_) window_.hurry();
       moved_ = false;
     }
