@@ -56,7 +56,9 @@ Proxy session_proxy(const std::string& name, const PhotoSet& set, const fs::path
   if (name.starts_with("hull"))
     throw InputError("--proxy", name,
                      "needs silhouettes, which a session's frames do not have: give auto, sphere:R, box or a mesh");
-  return make_proxy(name, set, folder);
+  Proxy proxy = make_proxy(name, set, folder);
+  if (auto* mesh = std::get_if<MeshProxy>(&proxy)) return MeshProxy(std::move(mesh->mesh), true);
+  return proxy;
 }
 
 TriangleMesh mesh_of(const Surroundings& surroundings) {
