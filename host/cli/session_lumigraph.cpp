@@ -27,7 +27,8 @@ Surroundings surroundings_of_session(const fs::path& folder, const Progress& pro
   options.size = 2;
   const auto rectangle = covered_rectangle(calibration, session.header().target, options.height_m);
   if (!rectangle)
-    throw InputError("--proxy", "auto", "needs mirror views that look through the world's ground: give sphere:R, box or a mesh");
+    throw InputError("--proxy", "auto",
+                     "needs mirror views that look through the world's ground: give sphere:R, box or a mesh");
   const std::vector<FieldView> views = load_field_views(session, response_of(session), calibration, {}, progress);
   return resample(views, *rectangle, options, progress).field.surroundings;
 }
@@ -53,8 +54,11 @@ Proxy session_proxy(const std::string& name, const PhotoSet& set, const fs::path
   if (name == "auto") return walls_of(surroundings_of_session(folder, progress), name);
   if (name.ends_with(".lf.exr")) return walls_of(read_light_field(name).surroundings, name);
   if (name.starts_with("hull"))
-    throw InputError("--proxy", name, "needs silhouettes, which a session's frames do not have: give auto, sphere:R, box or a mesh");
-  return make_proxy(name, set, folder);
+    throw InputError("--proxy", name,
+                     "needs silhouettes, which a session's frames do not have: give auto, sphere:R, box or a mesh");
+  Proxy proxy = make_proxy(name, set, folder);
+  if (auto* mesh = std::get_if<MeshProxy>(&proxy)) return MeshProxy(std::move(mesh->mesh), true);
+  return proxy;
 }
 
 TriangleMesh mesh_of(const Surroundings& surroundings) {
