@@ -62,10 +62,10 @@ class EmitterLight {
     const Eigen::Vector3f to = (world_from_plane.inverse() * e.emitter.position.cast<double>()).cast<float>() - x;
     const Eigen::Vector3f across = to.unitOrthogonal(), up = to.normalized().cross(across);
     const float sine = e.emitter.radius_m / std::max(to.norm(), e.emitter.radius_m);
-    constexpr int samples = 6 * rings * rings;
-    const float weight = std::numbers::pi_v<float> * sine * sine / (samples * points * points * points);
-    for (int k = 0; k < samples; ++k) {  // equal areas
-      const float radius = e.emitter.radius_m * std::sqrt((static_cast<float>(k) + 0.5F) / samples);
+    constexpr int on_disc = 6 * rings * rings;
+    const float weight = std::numbers::pi_v<float> * sine * sine / (on_disc * points * points * points);
+    for (int k = 0; k < on_disc; ++k) {  // equal areas
+      const float radius = e.emitter.radius_m * std::sqrt((static_cast<float>(k) + 0.5F) / on_disc);
       const float angle = static_cast<float>(k) * 2.3999632F;  // golden
       const Eigen::Vector3f d = (to + radius * (std::cos(angle) * across + std::sin(angle) * up)).normalized();
       if (d.z() < 0.02F) continue;  // looks along the plane: outside every rectangle
