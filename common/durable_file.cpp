@@ -74,9 +74,10 @@ void write_whole_file(const std::filesystem::path& file, std::string_view bytes,
   if (durable) sync_path(file.has_parent_path() ? file.parent_path() : ".");
 }
 
-void sync_path(const std::filesystem::path& file_or_folder) {
+void sync_path(const std::filesystem::path& file_or_folder, AfterSync after) {
   const Descriptor descriptor(file_or_folder, O_RDONLY);
   if (descriptor.value() < 0 || ::fsync(descriptor.value()) != 0) fail(file_or_folder, errno);
+  if (after == AfterSync::drop) ::posix_fadvise(descriptor.value(), 0, 0, POSIX_FADV_DONTNEED);  // a wish, not a need
 }
 
 }  // namespace mf

@@ -12,7 +12,7 @@ namespace mf {
 
 namespace {
 
-constexpr std::uint32_t isal_level = 3;  // on noise the fastest of ISA-L's four, though not in name
+constexpr std::uint32_t isal_level = 3;  // on frames the fastest of ISA-L's four, though not in name
 
 // A stored block of 65535 bytes costs five; a stream two at its begin and four at its end. That is its worst case.
 std::size_t most_deflated(std::size_t bytes) {

@@ -88,6 +88,9 @@ class SessionWriter {
   };
   struct Options {
     Durability durability = Durability::each;
+    // In batches: the system's memory need not hold the frames that are durable. A recording would fill it in a minute,
+    // and to find ever more pages costs more than to use the same ones again.
+    bool read_later = false;
   };
   SessionWriter(const std::filesystem::path& folder, const SessionHeader&, const Options&);
   SessionWriter(SessionWriter&&) noexcept;
@@ -132,8 +135,12 @@ class SessionReader {
   [[nodiscard]] const std::vector<SessionFrame>& frames() const;    // all, by id
   [[nodiscard]] std::vector<SessionFrame> frames(FrameRole) const;  // of one role, by id
   [[nodiscard]] const std::vector<FrameGap>& gaps() const;          // by next_id
-  // Frames whose files are there, but that the index does not tell of. A recording that runs, or was killed, has those
-  // of its last moments, which were not acknowledged; many mean that session.db-wal is damaged.
+  // What the index once told of and does not any more, or tells wrongly: a line for each kind, that names the file and
+  // the remedy. Empty when it is whole. Damage that leaves nothing to read is thrown instead; that of a frame's file is
+  // told of by read_frame().
+  [[nodiscard]] const std::vector<std::string>& damage() const;
+  // Frames whose files are there, but that the index does not tell of: a recording that runs, or was killed, has those
+  // of its last moments, which were not acknowledged.
   [[nodiscard]] std::int64_t frames_without_row() const;
   // What write_document() wrote; nothing when there is no such document.
   [[nodiscard]] std::optional<nlohmann::json> document(const std::string& key) const;

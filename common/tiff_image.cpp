@@ -15,6 +15,7 @@
 #include "common/check.h"
 #include "common/error.h"
 #include "common/fast_deflate.h"
+#include "common/literal_deflate.h"
 
 namespace mf {
 
@@ -51,14 +52,15 @@ tmsize_t read_memory(thandle_t handle, void* buffer, tmsize_t size) {
 
 tmsize_t write_memory(thandle_t handle, void* buffer, tmsize_t size) {
   MemoryFile& file = memory_file(handle);
+  const std::string_view bytes(static_cast<const char*>(buffer), static_cast<std::size_t>(size));
   try {
-    const std::uint64_t end = file.position + static_cast<std::uint64_t>(size);
-    if (end > file.written.size()) file.written.resize(end);
+    if (file.position > file.written.size()) file.written.resize(file.position);
+    const std::size_t over = std::min<std::size_t>(bytes.size(), file.written.size() - file.position);
+    file.written.replace(file.position, over, bytes);  // at the end, where nearly all goes, that appends
   } catch (const std::bad_alloc&) {
     return -1;  // no exception may cross libtiff's C frames
   }
-  std::memcpy(file.written.data() + file.position, buffer, static_cast<std::size_t>(size));
-  file.position += static_cast<std::uint64_t>(size);
+  file.position += bytes.size();
   return size;
 }
 
@@ -229,6 +231,14 @@ Image<Pixel> read_blocks(TIFF* tiff, const Layout& layout, const RowRange& wante
   return image;
 }
 
+// More than half of them zero: a picture without noise, or without light. Of every 61 values one is looked at.
+bool repeats_itself(std::span<const std::uint16_t> differences) {
+  constexpr std::size_t each = 61;  // hardly a divisor of a row's length: all columns get their turn
+  std::size_t zeros = 0, seen = 0;
+  for (std::size_t i = 0; i < differences.size(); i += each, ++seen) zeros += differences[i] == 0 ? 1 : 0;
+  return 2 * zeros > seen;
+}
+
 // Each row as the differences of its neighbours, channel by channel (TIFF 6.0, section 14), deflated: what libtiff
 // writes with PREDICTOR_HORIZONTAL, but fast enough for a camera.
 void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::uint16_t> pixels,
@@ -244,7 +254,10 @@ void write_deflated_strip(TIFF* tiff, std::uint32_t strip, std::span<const std::
       to[i] = static_cast<std::uint16_t>(from[i] - from[i - channels]);
   }
   deflated.clear();
-  append_deflated({reinterpret_cast<const std::uint8_t*>(differences.data()), 2 * differences.size()}, deflated);
+  if (repeats_itself(differences))
+    append_deflated({reinterpret_cast<const std::uint8_t*>(differences.data()), 2 * differences.size()}, deflated);
+  else
+    append_deflated_literals(differences, deflated);
   const auto size = static_cast<tmsize_t>(deflated.size());
   check(TIFFWriteRawStrip(tiff, strip, deflated.data(), size) == size, "a TIFF strip is written to memory");
 }
@@ -273,7 +286,8 @@ std::string encode(const Image<Pixel>& image, TiffCompression compression) {
   constexpr bool is_float = std::is_same_v<Pixel, float>;
   MemoryFile memory;
   memory.writing = true;
-  memory.written.reserve(image.data.size() * sizeof(Pixel) + 4096);
+  const std::size_t raw_bytes = image.data.size() * sizeof(Pixel);
+  memory.written.reserve((compression == TiffCompression::none ? raw_bytes : raw_bytes / 4 * 3) + 4096);
   const TiffHandle handle = open_tiff(memory);
   check(handle != nullptr, "a TIFF opens in memory");
   TIFF* tiff = handle.get();

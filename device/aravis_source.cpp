@@ -13,6 +13,7 @@
 #include "device/aravis_features.h"
 #include "device/aravis_handles.h"
 #include "device/clock.h"
+#include "device/gige_control.h"
 #include "device/pixel_packing.h"
 
 namespace mf {
@@ -55,6 +56,7 @@ class AravisSource final : public CameraSource {
   CameraDescription description_;
   std::atomic<bool> lost_ = false;
   bool started_ = false;
+  std::optional<GigeControl> control_;  // of a GigE camera; after the camera, which it may be asking
 };
 
 AravisSource::AravisSource(const CameraSettings& settings)
@@ -179,6 +181,10 @@ void AravisSource::start() {
   arv_camera_start_acquisition(camera_.get(), failure);
   failure.raise_if_any("the camera does not start");
   started_ = true;
+  if (arv_camera_is_gv_device(camera_.get()) == 0) return;
+  const double rate_hz = std::max(description_.frame_rate_hz, 0.1);
+  const std::chrono::milliseconds patience(250 + static_cast<int>(2000 / rate_hz));  // two frames, and their resending
+  control_.emplace(arv_camera_get_device(camera_.get()), patience);
 }
 
 bool AravisSource::unpack_into(ArvBuffer* buffer, CameraFrame& into) const {
@@ -198,7 +204,11 @@ Received AravisSource::receive(CameraFrame& into, std::chrono::milliseconds at_m
         "frame has the camera's size");
   const auto us = std::chrono::duration_cast<std::chrono::microseconds>(at_most).count();
   ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(us));
-  if (buffer == nullptr) return lost_ ? Received::lost : Received::nothing;
+  if (buffer == nullptr) {
+    if (control_ && control_->is_lost()) lost_ = true;
+    return lost_ ? Received::lost : Received::nothing;
+  }
+  if (control_) control_->note_frame();
   into.arrival = arrival_of(buffer);
   const bool complete = arv_buffer_get_status(buffer) == ARV_BUFFER_STATUS_SUCCESS && unpack_into(buffer, into);
   arv_stream_push_buffer(stream_.get(), buffer);

@@ -31,17 +31,16 @@ CameraKeeper::CameraKeeper(OpenCamera open, std::chrono::milliseconds reopen_eac
 
 Received CameraKeeper::receive(CameraFrame& into, std::chrono::milliseconds at_most) {
   if (camera_ == nullptr) {
-    const auto now = std::chrono::steady_clock::now();
-    if (now < next_try_)
-      std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(at_most, next_try_ - now));
-    else
-      reopen();
+    look_for_camera(at_most);
     return Received::nothing;
   }
   const Received received = camera_->receive(into, at_most);
   if (received == Received::lost) {
-    camera_.reset();
-    next_try_ = std::chrono::steady_clock::now();
+    next_try_ = std::chrono::steady_clock::now() + reopen_each_;
+    opening_ = std::async(std::launch::async, [this, gone = std::move(camera_)]() mutable {
+      gone.reset();
+      return reopened();
+    });
   }
   return received;
 }
@@ -56,19 +55,30 @@ std::optional<MeteringResult> CameraKeeper::meter(const MeteringOptions& options
   return result;
 }
 
-void CameraKeeper::reopen() {
-  next_try_ = std::chrono::steady_clock::now() + reopen_each_;
+void CameraKeeper::look_for_camera(std::chrono::milliseconds at_most) {
+  if (!opening_.valid()) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now < next_try_)
+      return std::this_thread::sleep_for(std::min<std::chrono::nanoseconds>(at_most, next_try_ - now));
+    next_try_ = now + reopen_each_;
+    opening_ = std::async(std::launch::async, [this] { return reopened(); });
+  }
+  if (opening_.wait_for(at_most) == std::future_status::ready) camera_ = opening_.get();
+}
+
+std::unique_ptr<CameraSource> CameraKeeper::reopened() const {
   try {
     std::unique_ptr<CameraSource> camera = open_();
-    if (!same_frames(camera->description(), description_)) return;
+    if (!same_frames(camera->description(), description_)) return nullptr;
     if (metered_) {
       camera->set_exposure_s(metered_->exposure_s);
       if (const auto request = request_of(metered_->response))
         (void)apply_response(camera->features(), request, metered_->exposure_s);
     }
     camera->start();
-    camera_ = std::move(camera);
-  } catch (const InputError&) {  // not back yet
+    return camera;
+  } catch (const InputError&) {
+    return nullptr;
   }
 }
 

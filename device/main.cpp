@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -72,6 +73,7 @@ void replay_session(const Arguments& a) {
   fmt::print("{}: {} of {} frames with tags ({:.0f} in the median one), {} posed, {:.1f} ms a frame{}\n",
              a.replay.string(), r.with_tags, r.frames, r.median_tags, r.posed, r.median_ms,
              r.covered ? fmt::format(", {:.0f} % of the light covered", 100 * *r.covered) : "");
+  for (const std::string& line : r.damage) fmt::print(stderr, "warning: {}\n", line);
 }
 
 void show(const mf::RigStatus& s) {
@@ -79,7 +81,16 @@ void show(const mf::RigStatus& s) {
              s.durable_frames, s.lost_frames, s.gaps, s.queued, s.problem);
 }
 
+// A frame's memory comes and goes many times a second. Given back to the system, every page of it would be a fault
+// anew.
+void keep_memory() {
+  constexpr int larger_than_a_frame = 64 << 20, most_kept = 64 << 20;
+  mallopt(M_MMAP_THRESHOLD, larger_than_a_frame);
+  mallopt(M_TRIM_THRESHOLD, most_kept);
+}
+
 void run(const Arguments& a) {
+  keep_memory();
   const mf::DeviceConfig config = mf::read_device_config(a.config);
   mf::DaemonOptions options;
   options.record_now = a.record || !a.output.empty();

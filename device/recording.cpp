@@ -38,7 +38,7 @@ Recording::Recording(const std::filesystem::path& session, SessionHeader header,
   header.format = camera.format;
   header.width = camera.width;
   header.height = camera.height;
-  SessionWriter writer(session, header, {SessionWriter::Durability::batches});
+  SessionWriter writer(session, header, {SessionWriter::Durability::batches, true});
   writer.write_document("device", document_of(camera));
   recorder_.emplace(std::move(writer), camera, clock_ns(CLOCK_MONOTONIC), options);
   spare_.codes = ImageU16(camera.width, camera.height, 1);

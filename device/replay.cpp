@@ -34,6 +34,7 @@ ReplayResult replay(const std::filesystem::path& folder, const LookoutOptions& o
   Sightseer seer(options.seeing, header.target, header.world, header.width, header.height);
   FrameDetector detector(detection_options(options, header.target), response_of_session(session), header.format);
   ReplayResult result;
+  result.damage = session.damage();
   std::vector<double> tags, milliseconds;
   for (const SessionFrame& frame : session.frames(FrameRole::mirror)) {
     CameraFrame camera_frame;

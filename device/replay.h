@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "device/lookout.h"
 
@@ -14,9 +16,10 @@ struct ReplayResult {
   int frames = 0;     // of the mirror
   int with_tags = 0;  // of them
   int posed = 0;
-  double median_tags = 0;         // of the mirror and the world, in frames that have some
-  double median_ms = 0;           // to find them
-  std::optional<double> covered;  // of the light; nothing when no pose or no world was known
+  double median_tags = 0;           // of the mirror and the world, in frames that have some
+  double median_ms = 0;             // to find them
+  std::optional<double> covered;    // of the light; nothing when no pose or no world was known
+  std::vector<std::string> damage;  // SessionReader::damage()
 };
 
 // Tags and pose of one frame, as they were found.

@@ -10,6 +10,7 @@
 #include "common/error.h"
 #include "common/json_file.h"
 #include "device/board.h"
+#include "device/clock.h"
 
 namespace mf {
 
@@ -131,11 +132,21 @@ void Rig::start() {
       throw InputError(options_.recordings.string(), "",
                        fmt::format("has {} MB left: free some space before recording", free >> 20));
     begin(options_.session ? *std::exchange(options_.session, std::nullopt) : new_session(options_.recordings));
+    forget_waiting_frames();
     scene_comes_ = lookout_ && lookout_->mirror_in_view() == false;
     if (lookout_) lookout_->begin_recording();
   } catch (const InputError& e) {
     end(RigState::error, e.what());
   }
+}
+
+// A slow disk takes its time over a new session, and then the camera's own buffers are full: what they hold is old, and
+// what came after it is missing. The recording has neither.
+void Rig::forget_waiting_frames() {
+  const std::int64_t ready_ns = clock_ns(CLOCK_MONOTONIC);
+  Received received = Received::frame;
+  do received = keeper_.receive(spare_, std::chrono::milliseconds(0));
+  while (received == Received::incomplete || (received == Received::frame && spare_.arrival.monotonic_ns < ready_ns));
 }
 
 void Rig::begin(const std::filesystem::path& session) {

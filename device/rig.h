@@ -66,6 +66,7 @@ class Rig {
   void start();
   void stop();
   void begin(const std::filesystem::path& session);
+  void forget_waiting_frames();
   void end(RigState, const std::string& problem);
   void watch_recording();
   void go_on_elsewhere(const RecorderStatus&);

@@ -81,7 +81,7 @@ void run(CalibrateArguments& arguments) {
   arguments.options.distortion = *distortion;
   if (const std::optional<std::string> fault = arguments.options.validate()) throw InputError("options", "", *fault);
   const Progress progress = progress_bar();
-  const SessionReader session(arguments.session);
+  const SessionReader session = open_session(arguments.session);
   const ResponseCurve response = response_of(session);
   auto start = std::chrono::steady_clock::now();
   const CalibrationInput input =

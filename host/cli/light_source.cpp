@@ -71,10 +71,10 @@ LightSource open_light_source(const std::string& command, const std::filesystem:
     seconds["reading"] = seconds_since(start);
     return field;
   }
-  SessionViews session = load_session_views(command, path, options, progress);
+  SessionViews session = load_session_views(command, path, options, Team(), progress);
   seconds["loading"] = seconds_since(start);
   start = Clock::now();
-  const Resampling focused(session.views, session.rectangle, options, progress);
+  const Resampling focused(session.views, session.rectangle, options, Team(), progress);
   seconds["focusing"] = seconds_since(start);
   return Capture{std::move(session.views), focused.field(), focused.k()};
 }

@@ -10,7 +10,7 @@
 #include "common/progress.h"
 #include "host/light_field/resample.h"
 #include "host/render/incident_light.h"
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 namespace mf {
 

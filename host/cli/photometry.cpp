@@ -8,6 +8,7 @@
 
 #include "common/json_file.h"
 #include "host/cli/command.h"
+#include "host/cli/session_files.h"
 
 namespace mf {
 
@@ -21,7 +22,7 @@ struct PhotometryArguments {
 };
 
 void run(const PhotometryArguments& arguments) {
-  const SessionReader session(arguments.session);
+  const SessionReader session = open_session(arguments.session);
   const PhotometryResult result = photometry(session, arguments.options, progress_bar());
   const std::filesystem::path output =
       arguments.output.empty() ? arguments.session / "response.json" : arguments.output;

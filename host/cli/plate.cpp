@@ -54,7 +54,7 @@ void write_camera(const std::filesystem::path& file, const Calibration& calibrat
 }
 
 void run(const PlateArguments& a) {
-  const SessionReader session(a.session);
+  const SessionReader session = open_session(a.session);
   const Calibration calibration = calibration_of(session);
   const std::vector<SessionFrame> scenes = session.frames(FrameRole::scene);
   if (scenes.empty())

@@ -98,7 +98,7 @@ void create_output_folder(const ProcessArguments& a) {
 
 void run(const ProcessArguments& a) {
   check_options(a);
-  const SessionReader session(a.session);
+  const SessionReader session = open_session(a.session);
   create_output_folder(a);
   const Progress progress = progress_bar();
   std::map<std::string, double> seconds;
@@ -107,7 +107,8 @@ void run(const ProcessArguments& a) {
   const Calibration calibration =
       timed(seconds, "calibrate", [&] { return estimate_calibration(session, response, a.calibration, progress); });
   const fs::path field_file = a.output / "field.lf.exr";
-  timed(seconds, "resample", [&] { return run_resample(a.session, field_file, a.resample, progress); });
+  Team alone;
+  timed(seconds, "resample", [&] { return run_resample(a.session, field_file, a.resample, alone, progress); });
   const LightField field = read_light_field(field_file);
   const Eigen::Vector3d at = probe_point(field.plane);
   const Probe probe =

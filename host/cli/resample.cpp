@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <chrono>
 #include <cmath>
@@ -19,6 +20,7 @@ struct ResampleArguments {
   std::filesystem::path output;
   ResampleOptions options;
   std::vector<double> rectangle;
+  int threads = 0;
   bool json = false;
 };
 
@@ -41,9 +43,16 @@ nlohmann::json summarize(const ResampleResult& r) {
 }
 
 void run(ResampleArguments& a) {
+  if (a.threads < 0)
+    throw InputError("resample", "--threads", "must be a number of threads (0: as many as processors)");
   if (!a.rectangle.empty())
     a.options.rectangle = std::array<double, 4>{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
-  const ResampleResult r = run_resample(a.session, a.output, a.options, progress_bar());
+  std::optional<tbb::global_control> limit;
+  if (a.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(a.threads));
+  Team team = Team::join();
+  const ResampleResult r =
+      run_resample(a.session, a.output, a.options, team, team.rank() == 0 ? progress_bar() : Progress());
+  if (team.rank() > 0) return;
   const Eigen::Vector2d size = r.field.plane.size_m();
   print_summary(
       a.json, summarize(r),
@@ -56,12 +65,12 @@ void run(ResampleArguments& a) {
 }  // namespace
 
 ResampleResult run_resample(const std::filesystem::path& folder, const std::filesystem::path& output,
-                            const ResampleOptions& options, const Progress& progress) {
+                            const ResampleOptions& options, Team& team, const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
-  const SessionViews session = load_session_views("resample", folder, options, progress);
+  const SessionViews session = load_session_views("resample", folder, options, team, progress);
   const double loading = seconds_since(start);
-  ResampleResult result =
-      resample_to_file(output, session.views, session.rectangle, options, session.absolute, progress);
+  Resampling resampling(session.views, session.rectangle, options, team, progress);
+  ResampleResult result = resample_to_file(resampling, output, session.absolute, team, progress);
   result.seconds["loading"] = loading;
   result.seconds["total"] = seconds_since(start);
   return result;
@@ -82,6 +91,7 @@ void add_resample_command(CommandLine& program) {
   command.option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)");
   command.values("--rectangle", 4, a->rectangle,
                  "x0 y0 x1 y1 of the plane's rectangle, world metres (default: where the mirror swept)");
+  command.option("--threads", a->threads, "threads of this process (0: as many as processors)");
   add_json_flag(command, a->json);
   command.on_run([a] { run(*a); });
 }

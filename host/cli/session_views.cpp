@@ -9,10 +9,10 @@
 namespace mf {
 
 SessionViews load_session_views(const std::string& command, const std::filesystem::path& folder,
-                                const ResampleOptions& options, const Progress& progress) {
+                                const ResampleOptions& options, const Team& team, const Progress& progress) {
   if (const auto problem = options.validate())
     throw InputError(command, "--" + problem->substr(0, problem->find(':')), problem->substr(problem->find(':') + 2));
-  const SessionReader session(folder);
+  const SessionReader session = open_session(folder);
   const ResponseCurve response = response_of(session);
   const Calibration calibration = calibration_of(session);
   std::optional<PlaneRectangle> rectangle;
@@ -25,7 +25,7 @@ SessionViews load_session_views(const std::string& command, const std::filesyste
   if (!rectangle)
     throw InputError((folder / "calibration.json").string(), "frames",
                      "no mirror view looks through the plane at this --height: lower it, or give --rectangle");
-  return {load_field_views(session, response, calibration, {}, progress), *rectangle, response.absolute};
+  return {load_field_views(session, response, calibration, team, progress), *rectangle, response.absolute};
 }
 
 }  // namespace mf

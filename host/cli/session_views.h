@@ -6,6 +6,7 @@
 
 #include "common/progress.h"
 #include "host/light_field/resample.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -19,6 +20,6 @@ struct SessionViews {
 // Session folder (with response.json and calibration.json) → views. Throws InputError for a folder that is no such
 // session, and, naming `command` and the flag, for options that no light field can have.
 [[nodiscard]] SessionViews load_session_views(const std::string& command, const std::filesystem::path& folder,
-                                              const ResampleOptions&, const Progress&);
+                                              const ResampleOptions&, const Team&, const Progress&);
 
 }  // namespace mf

@@ -107,13 +107,18 @@ MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes>
   Lanes worst{};
   for (std::size_t j = 0; j < kept; ++j)
     for (std::size_t i = 0; i < block_lanes; ++i) least[j].v[i] = infinity;
+  std::size_t known = 0;
   for (const Lanes& penalty : penalties) {
     Lanes sinking = penalty;
+    int better = 0;
     for (std::size_t i = 0; i < block_lanes; ++i) {
       const float finite = sinking.v[i] < infinity ? sinking.v[i] : 0.0F;
       worst.v[i] = std::max(worst.v[i], finite);
+      better += sinking.v[i] < least[kept - 1].v[i] ? 1 : 0;
     }
-    for (std::size_t j = 0; j < kept; ++j)
+    if (better == 0) continue;
+    known = std::min(known + 1, kept);
+    for (std::size_t j = 0; j < known; ++j)
       for (std::size_t i = 0; i < block_lanes; ++i) {
         const float a = least[j].v[i], b = sinking.v[i];
         least[j].v[i] = std::min(a, b);
@@ -139,7 +144,8 @@ MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes>
       penalties[c].v[i] = weight;
     }
   for (std::size_t i = 0; i < block_lanes; ++i) {
-    sum.v[i] = 1 / std::max(sum.v[i], std::numeric_limits<float>::min());
+    constexpr float nobody = 1e-30F;  // where no view speaks, 0 times this one's inverse is still 0
+    sum.v[i] = 1 / std::max(sum.v[i], nobody);
     confidence.v[i] = std::min(confidence.v[i], 1.0F);
   }
   for (std::size_t c = 0; c < penalties.size(); ++c)
@@ -176,6 +182,14 @@ void add_colours(const std::uint16_t* seen, float unit, const Lanes& weight, Lan
   add_halves(seen, half_unshift, scaled, colour.x);
   add_halves(seen + block_lanes, half_unshift, scaled, colour.y);
   add_halves(seen + 2 * block_lanes, half_unshift, scaled, colour.z);
+}
+
+MF_VECTORIZED void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour) {
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    colour.x.v[i] += weight.v[i] * seen.x.v[i];
+    colour.y.v[i] += weight.v[i] * seen.y.v[i];
+    colour.z.v[i] += weight.v[i] * seen.z.v[i];
+  }
 }
 
 MF_VECTORIZED void decode_weights(const std::uint16_t* halves, Lanes& out) {

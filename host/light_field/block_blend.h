@@ -55,6 +55,8 @@ void weights_of(std::span<Lanes> penalties, std::span<const Lanes> view_weights,
 
 // colour += weight · seen (premultiplied red, green, blue at the vertices).
 void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3& colour);
+// The same where they are known at every texel.
+void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour);
 // The same for half floats by colour and lane, in `unit`.
 void add_colours(const std::uint16_t* seen, float unit, const Lanes& weight, Lanes3& colour);
 // Half floats of weights, by lane.

@@ -70,21 +70,31 @@ float unit_for(std::span<const Eigen::Vector4f> texels) {
 
 }  // namespace
 
-std::vector<PremultipliedImage> make_levels(int width, int height, std::span<const Eigen::Vector4f> texels) {
-  const float unit = unit_for(texels);
+namespace {
+
+std::vector<PremultipliedImage> empty_levels(int width, int height, float unit) {
   std::vector<PremultipliedImage> levels;
   levels.emplace_back(width, height, unit);
-  encode(texels, levels.back());
+  while (width > 2 || height > 2) {
+    width = (width + 1) / 2;
+    height = (height + 1) / 2;
+    levels.emplace_back(width, height, unit);
+  }
+  return levels;
+}
+
+}  // namespace
+
+std::vector<PremultipliedImage> make_levels(int width, int height, std::span<const Eigen::Vector4f> texels) {
+  std::vector<PremultipliedImage> levels = empty_levels(width, height, unit_for(texels));
+  encode(texels, levels.front());
   FloatTexels level, next;
   std::span<const Eigen::Vector4f> finer = texels;
-  while (width > 2 || height > 2) {
-    half_size(finer, width, height, next);
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    half_size(finer, levels[i - 1].width(), levels[i - 1].height(), next);
     std::swap(level, next);
     finer = level.texels;
-    width = level.width;
-    height = level.height;
-    levels.emplace_back(width, height, unit);
-    encode(finer, levels.back());
+    encode(finer, levels[i]);
   }
   return levels;
 }
@@ -238,11 +248,19 @@ void set_geometry(FieldView& view, const Calibration& calibration, const PixelBo
   view.focal_px = static_cast<float>(0.5 * (camera.fx() + camera.fy()) * scale);
 }
 
+void share_levels(const Team& team, std::size_t from, const PixelBox& box, std::vector<PremultipliedImage>& levels) {
+  if (team.size() == 1) return;
+  float unit = levels.empty() ? 0 : levels.front().unit();
+  team.share(std::as_writable_bytes(std::span(&unit, 1)), from);
+  if (levels.empty()) levels = empty_levels(box.width(), box.height(), unit);
+  for (PremultipliedImage& level : levels) team.share(std::as_writable_bytes(level.texels()), from);
+}
+
 }  // namespace
 
 std::vector<FieldView> load_field_views(const SessionReader& session, const ResponseCurve& response,
-                                        const Calibration& calibration, const FieldViewOptions& options,
-                                        const Progress& progress) {
+                                        const Calibration& calibration, const Team& team, const Progress& progress,
+                                        const FieldViewOptions& options) {
   const std::string source = (session.folder() / "calibration.json").string();
   if (!calibration.cam_from_world)
     throw InputError(source, "cam_from_world",
@@ -254,24 +272,26 @@ std::vector<FieldView> load_field_views(const SessionReader& session, const Resp
   const double scale = options.full_resolution ? 1.0 : 0.5;
   const Loader loader{session, response, calibration, options, scale, TakenPositions(calibration.camera, scale)};
   std::vector<FieldView> loaded(frames.size());
+  std::vector<PixelBox> boxes(frames.size());
   std::atomic<std::size_t> done = 0;
   std::mutex reporting;
   tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t i) {
     const MirrorPose& pose = calibration.frames[i];
     const auto virtual_view =
         pose.used ? mirror_view(pose.cam_from_mirror, session.header().target, calibration.camera) : std::nullopt;
-    const PixelBox box = virtual_view
-                             ? opening_box(virtual_view->opening_in_img, scale, loader.taken.width, loader.taken.height)
-                             : PixelBox{};
-    if (!box.empty()) {
+    if (virtual_view)
+      boxes[i] = opening_box(virtual_view->opening_in_img, scale, loader.taken.width, loader.taken.height);
+    if (!boxes[i].empty()) {
       loaded[i].frame = i;
-      set_geometry(loaded[i], calibration, box, *virtual_view, scale);
-      loaded[i].levels = levels_of(loader, frames[i], pose, box);
+      set_geometry(loaded[i], calibration, boxes[i], *virtual_view, scale);
+      if (team.has(i)) loaded[i].levels = levels_of(loader, frames[i], pose, boxes[i]);
     }
     const std::size_t finished = ++done;
     const std::lock_guard lock(reporting);
     report_progress(progress, "linearizing views", static_cast<double>(finished) / static_cast<double>(frames.size()));
   });
+  for (std::size_t i = 0; i < loaded.size(); ++i)
+    if (!boxes[i].empty()) share_levels(team, i % team.size(), boxes[i], loaded[i].levels);
   std::erase_if(loaded, [](const FieldView& v) { return v.levels.empty(); });
   if (loaded.empty()) throw InputError(source, "frames", "holds no usable mirror pose: look at why_not of each frame");
   return loaded;

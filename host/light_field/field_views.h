@@ -14,6 +14,7 @@
 #include "host/calibration/calibration.h"
 #include "host/light_field/half_floats.h"
 #include "host/light_field/view_border.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -116,8 +117,8 @@ struct FieldViewOptions {
 };
 
 // Every used frame of the calibration whose mirror is seen from its front. Throws InputError when the session has no
-// world frame or no usable frame.
+// world frame or no usable frame. A team loads each frame once, and all get all views.
 [[nodiscard]] std::vector<FieldView> load_field_views(const SessionReader&, const ResponseCurve&, const Calibration&,
-                                                      const FieldViewOptions&, const Progress&);
+                                                      const Team&, const Progress&, const FieldViewOptions& = {});
 
 }  // namespace mf

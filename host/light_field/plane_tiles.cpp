@@ -26,19 +26,13 @@ void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int
 }
 
 PlaneTiles::PlaneTiles(const RectifiedViews& views, const LightField& field, int k)
-    : views_(views),
-      field_(field),
-      k_(k),
-      best_views_(static_cast<std::size_t>((views.blocks() + 1) * (views.blocks() + 1))) {}
+    : views_(views), field_(field), k_(k) {}
 
 void PlaneTiles::fill(std::size_t direction, Eigen::Vector4f* tile) {
   direction_ = field_.plane.world_from_plane.rotation.cast<float>() * field_.directions.directions[direction];
-  const int blocks = views_.blocks();
-  for (int y = 0; y <= blocks; ++y)
-    for (int x = 0; x <= blocks; ++x) rank_views(x, y);
-  for (int y = 0; y < blocks; ++y)
-    for (int x = 0; x < blocks; ++x) {
-      gather_candidates(x, y);
+  for (int y = 0; y < views_.blocks(); ++y)
+    for (int x = 0; x < views_.blocks(); ++x) {
+      find_candidates(views_.block(x, y));
       Lanes3 colour{};
       Lanes confidence{};
       blend(x, y, colour, confidence);
@@ -46,35 +40,18 @@ void PlaneTiles::fill(std::size_t direction, Eigen::Vector4f* tile) {
     }
 }
 
-void PlaneTiles::rank_views(int corner_x, int corner_y) {
-  const RectifiedViews::Corner& corner = views_.corner(corner_x, corner_y);
-  const std::size_t count = corner.views.size();
+// The views whose rays through the block's middle lie nearest to the direction, each as if its weight were everywhere
+// what it is at most in the block.
+void PlaneTiles::find_candidates(const RectifiedViews::Block& block) {
+  const std::size_t count = block.views.size();
   bounds_.resize(std::max(bounds_.size(), count));
-  squared_chords(direction_, corner.ray_x.data(), corner.ray_y.data(), corner.ray_z.data(), corner.factor.data(), count,
+  squared_chords(direction_, block.ray_x.data(), block.ray_y.data(), block.ray_z.data(), block.factor.data(), count,
                  bounds_.data());
-  auto& best = best_views_[static_cast<std::size_t>(corner_y * (views_.blocks() + 1) + corner_x)];
-  best.clear();
-  for (const ViewPenalty& v : ranking_.find(bounds_.data(), count, static_cast<std::size_t>(k_) + spare_on_plane,
-                                            [&](std::size_t i) { return bounds_[i]; }))
-    best.push_back(corner.views[v.view]);
-}
-
-// The views that any corner of a block ranked among its best, each once, as slots of the block.
-void PlaneTiles::gather_candidates(int bx, int by) {
-  const RectifiedViews::Block& block = views_.block(bx, by);
-  ++block_count_;
+  least_ = ranking_.find(bounds_.data(), count, 2 * static_cast<std::size_t>(k_) + spare_on_plane,
+                         [&](std::size_t i) { return bounds_[i]; });
+  std::sort(least_.begin(), least_.end(), ranks_before);  // sums in one order, and the best views first
   candidates_.clear();
-  for (int corner = 0; corner < 4; ++corner)
-    for (const std::uint32_t view :
-         best_views_[static_cast<std::size_t>((by + corner / 2) * (views_.blocks() + 1) + bx + corner % 2)]) {
-      if (mark_.size() <= view) mark_.resize(view + 1, 0);
-      if (mark_[view] == block_count_) continue;
-      mark_[view] = block_count_;
-      const auto at = std::lower_bound(block.views.begin(), block.views.end(), view);
-      if (at != block.views.end() && *at == view)
-        candidates_.push_back(static_cast<std::size_t>(at - block.views.begin()));
-    }
-  std::sort(candidates_.begin(), candidates_.end());  // sums in one order, however they were found
+  for (const ViewPenalty& v : least_) candidates_.push_back(v.view);
 }
 
 void PlaneTiles::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {

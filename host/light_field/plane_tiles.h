@@ -11,7 +11,7 @@
 namespace mf {
 
 // Fills tiles of a light field whose proxy is the plane itself, from rectified views: weighted sums, no projection. The
-// views that could speak are ranked at the corners of blocks, the weights are exact at every texel. One a thread: it
+// views that could speak are ranked once a block, the weights are exact at every texel. One a thread: it
 // holds the working memory.
 class PlaneTiles {
  public:
@@ -22,8 +22,7 @@ class PlaneTiles {
   void fill(std::size_t direction, Eigen::Vector4f* tile);
 
  private:
-  void rank_views(int corner_x, int corner_y);
-  void gather_candidates(int block_x, int block_y);
+  void find_candidates(const RectifiedViews::Block&);
   void blend(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
 
   const RectifiedViews& views_;
@@ -33,9 +32,7 @@ class PlaneTiles {
 
   std::vector<float> bounds_;
   LeastPenalties ranking_;
-  std::vector<std::vector<std::uint32_t>> best_views_;  // by block corner
-  std::vector<std::uint32_t> mark_;                     // by view: the block that listed it last
-  std::uint32_t block_count_ = 0;
+  std::vector<ViewPenalty> least_;
   std::vector<std::size_t> candidates_;  // slots of the block at hand
   std::vector<Lanes> penalties_, weights_;
 };

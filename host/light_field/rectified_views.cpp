@@ -21,17 +21,12 @@ RectifiedViews::RectifiedViews(const std::vector<FieldView>& views, const PlaneR
     : grid_(plane, resolution),
       texel_m_(static_cast<float>(plane.size_m().maxCoeff() / resolution)),
       blocks_((resolution + block_side - 1) / block_side),
-      block_(static_cast<std::size_t>(blocks_ * blocks_)),
-      corner_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))) {
+      block_(static_cast<std::size_t>(blocks_ * blocks_)) {
   for (const FieldView& view : views) {
     centre_.push_back(view.centre_in_world);
     unit_.push_back(view.levels.front().unit());
   }
-  tbb::parallel_for(0, (blocks_ + 1) * (blocks_ + 1), [&](int i) {
-    const int x = i % (blocks_ + 1), y = i / (blocks_ + 1);
-    list_rays(views, x, y);
-    if (x < blocks_ && y < blocks_) rectify(views, x, y);
-  });
+  tbb::parallel_for(0, blocks_ * blocks_, [&](int i) { rectify(views, i % blocks_, i / blocks_); });
 }
 
 namespace {
@@ -74,11 +69,12 @@ void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, i
   const std::array<Eigen::Vector3f, 4> corners{grid_.at(x0, y0), grid_.at(x0 + block_side, y0),
                                                grid_.at(x0, y0 + block_side),
                                                grid_.at(x0 + block_side, y0 + block_side)};
+  const Eigen::Vector3f middle = grid_.at(x0 + 0.5F * block_side, y0 + 0.5F * block_side);
   std::array<std::uint16_t, 4 * block_lanes> texels;
   for (std::uint32_t v = 0; v < views.size(); ++v) {
     const float texel_px = texel_m_ * views[v].focal_px / (corners[0] - views[v].centre_in_world).norm();
     if (!may_see(views[v], corners, 2 * texel_px + 2)) continue;
-    bool seen = false;
+    float most = 0;
     for (std::size_t i = 0; i < block_lanes; ++i) {
       const Eigen::Vector3f p =
           grid_.at(x0 + static_cast<float>(i % block_side) + 0.5F, y0 + static_cast<float>(i / block_side) + 0.5F);
@@ -86,27 +82,16 @@ void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, i
       for (std::size_t c = 0; c < 3; ++c)
         texels[c * block_lanes + i] = to_normal_half(shown[static_cast<Eigen::Index>(c)] / unit_[v]);
       texels[3 * block_lanes + i] = to_normal_half(shown.w());
-      seen = seen || shown.w() >= smallest_view_weight;
+      most = std::max(most, shown.w());
     }
-    if (!seen) continue;
+    if (most < smallest_view_weight) continue;
+    const Eigen::Vector3f ray = (middle - views[v].centre_in_world).normalized();
     block.views.push_back(v);
+    block.ray_x.push_back(ray.x());
+    block.ray_y.push_back(ray.y());
+    block.ray_z.push_back(ray.z());
+    block.factor.push_back(1 / (most * most));
     block.texels.insert(block.texels.end(), texels.begin(), texels.end());
-  }
-}
-
-void RectifiedViews::list_rays(const std::vector<FieldView>& views, int corner_x, int corner_y) {
-  Corner& corner = corner_[static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x)];
-  const Eigen::Vector3f p =
-      grid_.at(static_cast<float>(corner_x * block_side), static_cast<float>(corner_y * block_side));
-  for (std::uint32_t v = 0; v < views.size(); ++v) {
-    const float weight = look_at(views[v], p, texel_m_).w();
-    if (weight < smallest_view_weight) continue;
-    const Eigen::Vector3f ray = (p - views[v].centre_in_world).normalized();
-    corner.ray_x.push_back(ray.x());
-    corner.ray_y.push_back(ray.y());
-    corner.ray_z.push_back(ray.z());
-    corner.factor.push_back(1 / (weight * weight));
-    corner.views.push_back(v);
   }
 }
 

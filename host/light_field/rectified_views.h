@@ -30,7 +30,9 @@ class RectifiedViews {
   // What the views that see some of it show of a block: for each 4 × 64 half floats (premultiplied red, green, blue in
   // the view's unit; weight), by lane.
   struct Block {
-    std::vector<std::uint32_t> views;  // rising
+    std::vector<std::uint32_t> views;        // rising
+    std::vector<float> ray_x, ray_y, ray_z;  // of each through the block's middle, unit
+    std::vector<float> factor;               // 1 / weight², of the weight where it is largest
     std::vector<std::uint16_t> texels;
 
     [[nodiscard]] const std::uint16_t* colours(std::size_t slot) const {
@@ -38,31 +40,20 @@ class RectifiedViews {
     }
     [[nodiscard]] const std::uint16_t* weights(std::size_t slot) const { return colours(slot) + 3 * block_lanes; }
   };
-  // The views that see a corner of blocks: their rays through it.
-  struct Corner {
-    std::vector<float> ray_x, ray_y, ray_z;  // unit
-    std::vector<float> factor;               // 1 / weight²
-    std::vector<std::uint32_t> views;
-  };
 
   [[nodiscard]] int blocks() const { return blocks_; }  // along a side
   [[nodiscard]] const Block& block(int x, int y) const { return block_[static_cast<std::size_t>(y * blocks_ + x)]; }
-  [[nodiscard]] const Corner& corner(int x, int y) const {
-    return corner_[static_cast<std::size_t>(y * (blocks_ + 1) + x)];
-  }
   [[nodiscard]] const Eigen::Vector3f& centre(std::uint32_t view) const { return centre_[view]; }
   [[nodiscard]] float unit(std::uint32_t view) const { return unit_[view]; }
   [[nodiscard]] const TexelGrid& grid() const { return grid_; }
 
  private:
   void rectify(const std::vector<FieldView>&, int block_x, int block_y);
-  void list_rays(const std::vector<FieldView>&, int corner_x, int corner_y);
 
   TexelGrid grid_;
   float texel_m_;
   int blocks_;
   std::vector<Block> block_;
-  std::vector<Corner> corner_;
   std::vector<Eigen::Vector3f> centre_;
   std::vector<float> unit_;
 };

@@ -13,6 +13,7 @@
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/surroundings_search.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -43,7 +44,8 @@ struct ResampleResult {
 class Resampling {
  public:
   // `views` see the world frame and outlive this; `rectangle` is the plane's part to cover.
-  Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const ResampleOptions&,
+  // A team shares the work of focusing.
+  Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const ResampleOptions&, const Team&,
              const Progress&);
   ~Resampling();
   Resampling(const Resampling&) = delete;
@@ -56,6 +58,7 @@ class Resampling {
   void fill(std::size_t direction, Eigen::Vector4f* tile);
 
   [[nodiscard]] const std::vector<SphereScore>& sphere_scores() const;
+  [[nodiscard]] std::size_t views() const;
   [[nodiscard]] double focusing_s() const;  // how long the construction took
 
  private:
@@ -68,9 +71,9 @@ class Resampling {
                                       const ResampleOptions&, const Progress&);
 
 // All tiles, written to a file as they are made; the result's field has no texels. `absolute`: radiance is in the units
-// of the reference reading.
-[[nodiscard]] ResampleResult resample_to_file(const std::filesystem::path&, const std::vector<FieldView>& views,
-                                              const PlaneRectangle& rectangle, const ResampleOptions&, bool absolute,
+// of the reference reading. A team deals out the directions; rank 0 writes, the same bytes as one process alone, and
+// its result is the one that counts.
+[[nodiscard]] ResampleResult resample_to_file(Resampling&, const std::filesystem::path&, bool absolute, Team&,
                                               const Progress&);
 
 // The rectangle of the plane z = height (world) that the mirrors' openings cover: the box around all points that at

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "host/light_field/plane_tiles.h"
@@ -17,6 +18,7 @@ constexpr std::size_t spare_views_near_emitter = 26;  // there many views have n
 constexpr int fine_splits = 3;                        // and a cell near an emitter in 6 · 2³
 constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
 constexpr float same_ray = 1e-4F;                     // rays closer than this are the same
+constexpr float largest_jump = 0.1F;                  // of the cell, see is_rough()
 constexpr int outline_points = 3;                     // along a side: where it is tested who looks that way
 constexpr float outline_margin = 0.3F;                // of the outline's size, for what lies between those points
 
@@ -32,7 +34,8 @@ TileResampler::TileResampler(const std::vector<FieldView>& views, const LightFie
       blocks_((field.resolution + block_side - 1) / block_side),
       vertices_(blocks_ * block_vertices + 1),
       vertex_(static_cast<std::size_t>(vertices_ * vertices_)),
-      best_lookers_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))) {}
+      best_lookers_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))),
+      reach_m_(best_lookers_.size(), 0) {}
 
 void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
   prepare(direction);
@@ -46,6 +49,8 @@ void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
       Lanes confidence{};
       if (near_emitter(x, y))
         blend_near_emitter(x, y, colour, confidence);
+      else if (is_rough(x, y))
+        blend_rough(x, y, colour, confidence);
       else
         blend(x, y, colour, confidence);
       store_block(colour, confidence, x, y, field_.resolution, tile);
@@ -121,11 +126,16 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     return weight >= smallest_view_weight ? bounds_[i] / (weight * weight) : INFINITY;
   };
   const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
-  auto& best = best_lookers_[static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x)];
+  const std::size_t corner = static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x);
+  auto& best = best_lookers_[corner];
   best.clear();
+  float farthest = 0;
   for (const ViewPenalty& found :
-       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(k_) + spare, squared_penalty))
+       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(k_) + spare, squared_penalty)) {
     best.push_back(found.view);
+    farthest = std::max(farthest, bounds_[found.view]);
+  }
+  reach_m_[corner] = std::sqrt(farthest);
 }
 
 // The views that any corner of a block ranked among its best, each once.
@@ -200,6 +210,61 @@ void TileResampler::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {
   }
   weights_of(penalties_, weights_, k_, same_ray, confidence);
   for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(patches_[c], penalties_[c], colour);
+}
+
+// ---- where the proxy's distance jumps ----
+
+// Whether the proxy's distance changes so much from one vertex to the next that a view's pixel moves by a good part of
+// the cell: of views that pass the ray at a distance d, a change of inverse distance Δs moves it by d Δs.
+bool TileResampler::is_rough(int bx, int by) const {
+  float reach = 0;
+  for (int corner = 0; corner < 4; ++corner)
+    reach = std::max(reach, reach_m_[static_cast<std::size_t>((by + corner / 2) * (blocks_ + 1) + bx + corner % 2)]);
+  const float most = largest_jump * cell_.angle_rad / std::max(reach, 1e-6F);
+  const int x0 = bx * block_vertices, y0 = by * block_vertices;
+  for (int y = y0; y <= y0 + block_vertices; ++y)
+    for (int x = x0; x <= x0 + block_vertices; ++x) {
+      const float here = vertex(x, y).focus.w();
+      if (x < x0 + block_vertices && std::abs(vertex(x + 1, y).focus.w() - here) > most) return true;
+      if (y < y0 + block_vertices && std::abs(vertex(x, y + 1).focus.w() - here) > most) return true;
+    }
+  return false;
+}
+
+// Every texel by itself.
+void TileResampler::blend_rough(int bx, int by, Lanes3& colour, Lanes& confidence) {
+  Lanes3 p;
+  Lanes4 focus;
+  std::array<Vertex, block_lanes> texel;
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    Vertex& t = texel[i];
+    t.p = grid_.at(static_cast<float>(bx * block_side) + static_cast<float>(i % block_side) + 0.5F,
+                   static_cast<float>(by * block_side) + static_cast<float>(i / block_side) + 0.5F);
+    t.focus = proxy_point(t.p, cell_.direction, field_.surroundings.inverse_distance_along(t.p, cell_.direction));
+    p.x.v[i] = t.p.x();
+    p.y.v[i] = t.p.y();
+    p.z.v[i] = t.p.z();
+    focus.x.v[i] = t.focus.x();
+    focus.y.v[i] = t.focus.y();
+    focus.z.v[i] = t.focus.z();
+    focus.w.v[i] = t.focus.w();
+  }
+  seen_lanes_.resize(candidates_.size());
+  penalties_.resize(candidates_.size());
+  weights_.resize(candidates_.size());
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    const FieldView& view = views_[candidate_views_[c]];
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const Eigen::Vector4f seen = fetch_cell(view, texel[i]);
+      seen_lanes_[c].x.v[i] = seen.x();
+      seen_lanes_[c].y.v[i] = seen.y();
+      seen_lanes_[c].z.v[i] = seen.z();
+      weights_[c].v[i] = seen.w();
+    }
+    distance_penalties(p, focus, view.centre_in_world, weights_[c], penalties_[c]);
+  }
+  weights_of(penalties_, weights_, k_, same_ray, confidence);
+  for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
 }
 
 // ---- near emitters ----

@@ -21,7 +21,7 @@ namespace mf {
 // What varies slowly over the plane is computed on a sparse grid of vertices and interpolated (Buehler's blending
 // field): which views could speak for a ray is decided at every second vertex by ranking all that look that way; what a
 // view saw of the direction's cell is fetched at every vertex. The penalties, and so the weights, are exact at every
-// texel. One resampler a thread: it holds the working memory.
+// texel. Where the proxy's distance jumps nothing is interpolated. One resampler a thread: it holds the working memory.
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
@@ -58,6 +58,8 @@ class TileResampler {
   void rank_views(int corner_x, int corner_y);
   void gather_candidates(int block_x, int block_y);
   void blend(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
+  [[nodiscard]] bool is_rough(int block_x, int block_y) const;
+  void blend_rough(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
   [[nodiscard]] const Eigen::Vector4f& seen_at(std::size_t looker, int vertex_x, int vertex_y);
   [[nodiscard]] Eigen::Vector4f fetch_cell(const FieldView&, const Vertex&) const;
 
@@ -83,6 +85,7 @@ class TileResampler {
   std::vector<float> bounds_;
   LeastPenalties ranking_;
   std::vector<std::vector<std::uint32_t>> best_lookers_;  // by block corner
+  std::vector<float> reach_m_;                            // by block corner: how far the farthest of them pass
   std::vector<std::uint32_t> candidates_;                 // lookers, of the block at hand
   std::vector<std::uint32_t> candidate_views_;            // the same, as views
   std::vector<std::uint32_t> mark_;                       // by looker: the block that listed it last
@@ -90,6 +93,7 @@ class TileResampler {
   std::vector<Seen> seen_;  // by looker, then three rows of vertices: blocks share their edges
   std::uint32_t row_count_ = 0;
   std::vector<Patch<Eigen::Vector4f>> patches_;  // by candidate
+  std::vector<Lanes3> seen_lanes_;               // by candidate, in rough blocks
   std::vector<Lanes> penalties_, weights_;
 };
 

@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "host/io/mesh.h"
 #include "host/light_field/light_tiles.h"
-#include "host/render/mesh.h"
 
 namespace mf {
 

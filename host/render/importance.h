@@ -8,7 +8,7 @@
 
 #include "host/light_field/light_field.h"
 #include "host/light_field/light_tiles.h"
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 namespace mf {
 

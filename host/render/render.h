@@ -6,10 +6,10 @@
 
 #include "common/image.h"
 #include "common/progress.h"
+#include "host/io/view.h"
 #include "host/render/ground.h"
 #include "host/render/illuminator.h"
 #include "host/render/incident_light.h"
-#include "host/render/view.h"
 
 namespace mf {
 

@@ -16,18 +16,28 @@ namespace mf {
 namespace {
 
 // A sensor that is logarithmic from a tenth of the paper's light on.
+test::RenderedFrames exposed_as(PixelLayout layout) {
+  static const test::RenderedViews views = test::rendered_views(1024, 10, 32);
+  return exposed(views, {layout, 12, false}, 0.05);
+}
 const test::RenderedFrames& rendered() {
-  static const test::RenderedFrames frames = test::rendered_frames(1024, 10, 32, 0.05);
+  static const test::RenderedFrames frames = exposed_as(PixelLayout::bayer_rg);
+  return frames;
+}
+const test::RenderedFrames& rendered_mono() {
+  static const test::RenderedFrames frames = exposed_as(PixelLayout::mono);
   return frames;
 }
 
-void detect(benchmark::State& state, bool linear, double quad_decimate, bool follow) {
-  const test::RenderedFrames& r = rendered();
+void detect(benchmark::State& state, const test::RenderedFrames& (*frames)(), bool linear, double quad_decimate,
+            bool follow) {
+  const test::RenderedFrames& r = frames();
   DetectionOptions options;
   options.detector.quad_decimate = quad_decimate;
   if (follow)
     for (const PlanarTag& tag : r.mirror.tags) options.follow.ids.push_back(tag.id);
-  FrameDetector detector(options, linear ? r.response : linear_response(12, 64, 1, 3), r.format);
+  FrameDetector detector(options, linear ? r.response : linear_response(12, 64, 1, r.format.colour_channels()),
+                         r.format);
   test::CornerErrors errors;
   double milliseconds = 0, most = 0;
   std::size_t i = 0;
@@ -48,10 +58,18 @@ void detect(benchmark::State& state, bool linear, double quad_decimate, bool fol
   state.counters["found"] = static_cast<double>(errors.tags) / static_cast<double>(i);
   state.counters["false"] = errors.false_tags;
 }
-BENCHMARK_CAPTURE(detect, linearized, true, 2, false)->Unit(benchmark::kMillisecond)->Iterations(80);
-BENCHMARK_CAPTURE(detect, raw_codes, false, 2, false)->Unit(benchmark::kMillisecond)->Iterations(80);
-BENCHMARK_CAPTURE(detect, linearized_following, true, 2, true)->Unit(benchmark::kMillisecond)->Iterations(80);
-BENCHMARK_CAPTURE(detect, linearized_full_size, true, 1, false)->Unit(benchmark::kMillisecond)->Iterations(10);
+BENCHMARK_CAPTURE(detect, linearized, rendered, true, 2, false)->Unit(benchmark::kMillisecond)->Iterations(80);
+BENCHMARK_CAPTURE(detect, raw_codes, rendered, false, 2, false)->Unit(benchmark::kMillisecond)->Iterations(80);
+BENCHMARK_CAPTURE(detect, linearized_following, rendered, true, 2, true)->Unit(benchmark::kMillisecond)->Iterations(80);
+BENCHMARK_CAPTURE(detect, linearized_full_size, rendered, true, 1, false)
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(10);
+BENCHMARK_CAPTURE(detect, mono_linearized, rendered_mono, true, 2, false)
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(80);
+BENCHMARK_CAPTURE(detect, mono_raw_codes, rendered_mono, false, 2, false)
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(80);
 
 void levels(benchmark::State& state) {
   const test::RenderedFrames& r = rendered();

@@ -347,6 +347,39 @@ TEST(Session, FramesThatTheIndexDoesNotTellOfAreCounted) {
   EXPECT_EQ(SessionReader(folder / "s").frames_without_row(), 1);
 }
 
+// SQLite drops what follows damage in a log, as if it had not been committed.
+TEST(Session, CommitsThatADamagedLogDroppedAreToldOf) {
+  const test::TemporaryFolder folder;
+  SessionWriter writer(folder / "s", header_of({}), {SessionWriter::Durability::batches});
+  for (int i = 0; i < 3; ++i) {
+    writer.append(frame_of({}, i));
+    writer.commit();
+  }
+  fs::copy(folder / "s", folder / "cut", fs::copy_options::recursive);
+  EXPECT_TRUE(SessionReader(folder / "cut").damage().empty());
+  fs::resize_file(folder / "cut/session.db-wal", fs::file_size(folder / "s/session.db-wal") - 1);
+  fs::remove(folder / "cut/session.db-shm");
+  const SessionReader cut(folder / "cut");
+  EXPECT_EQ(cut.frames().size(), 2U);
+  ASSERT_EQ(cut.damage().size(), 1U);
+  EXPECT_TRUE(contains(cut.damage()[0], "session.db-wal: is damaged: its last 1 commits are lost, and 1 files"));
+  std::ofstream(folder / "s/session.db-commits") << "4 00000000\n";
+  const SessionReader miscounted(folder / "s");
+  ASSERT_EQ(miscounted.damage().size(), 1U);
+  EXPECT_TRUE(contains(miscounted.damage()[0], "session.db-commits: is damaged"));
+  std::ofstream(folder / "s/session.db-commits", std::ios::trunc).close();  // as a power cut may leave it
+  EXPECT_TRUE(SessionReader(folder / "s").damage().empty());
+}
+
+TEST(Session, LostRowsAreToldOf) {
+  const test::TemporaryFolder folder;
+  write_session(folder / "s", {}, 3);
+  run_sql(folder / "s", "DELETE FROM frames WHERE id = 1; UPDATE frames SET bytes = 7 WHERE id = 2");
+  const std::vector<std::string> damage = SessionReader(folder / "s").damage();
+  ASSERT_EQ(damage.size(), 1U);
+  EXPECT_TRUE(contains(damage[0], "session.db: 1 rows of its frames are damaged and 1 are lost"));
+}
+
 TEST(Session, WhatIsNoSessionIsToldApart) {
   const test::TemporaryFolder folder;
   const auto error = [](const fs::path& path) { return input_error_of([&] { SessionReader reader(path); }); };

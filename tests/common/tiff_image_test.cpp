@@ -4,6 +4,10 @@
 #include <gtest/gtest.h>
 #include <tiffio.h>
 
+#include <algorithm>
+#include <cmath>
+#include <random>
+
 #include "common/file_bytes.h"
 #include "tests/support/expect_input_error.h"
 #include "tests/support/foreign_png.h"
@@ -29,6 +33,56 @@ TEST(Tiff, RoundTripsEveryKindBitForBit) {
     EXPECT_TRUE(same_pixels(pixels, decode_tiff(encode_tiff(pixels), "f.tif").pixels));
 }
 
+// Shot noise over a bright window: what a camera sees. Rows of pure noise are the worst case of the Huffman code, as
+// its counts are sampled; a black one is the best.
+ImageU16 camera_codes(int width, int height, double electrons) {
+  ImageU16 image(width, height, 1);
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const double code = x > width / 2 && y > height / 2 ? 5000 : 150 + 600 * (1 + std::sin(0.01 * x + 0.02 * y));
+      image.at(x, y) = static_cast<std::uint16_t>(
+          std::clamp(code + std::sqrt(code * 4095 / electrons) * normal(random), 0.0, 4095.0));
+    }
+  return image;
+}
+
+ImageU16 surprising_codes() {
+  ImageU16 image(1024, 256, 1);
+  std::mt19937 random(6);
+  for (std::size_t i = 0; i < image.data.size(); ++i)
+    if (i % 2048 >= 256) image.data[i] = static_cast<std::uint16_t>(random());
+  return image;
+}
+
+TEST(Tiff, NoiseIsSmallerByWhatItsBitsAllow) {
+  for (const int width : {1024, 1023, 7}) {
+    const ImageU16 image = camera_codes(width, 700, 10000);
+    const std::string bytes = encode_tiff(image);
+    EXPECT_TRUE(same_pixels(image, decode_tiff(bytes, "f.tif").pixels));
+    if (width > 1000) {
+      EXPECT_LT(static_cast<double>(bytes.size()), 2.0 * width * 700 / 1.6);
+    }
+  }
+  const ImageU16 worst = surprising_codes(), black(640, 480, 1);
+  EXPECT_TRUE(same_pixels(worst, decode_tiff(encode_tiff(worst), "f.tif").pixels));
+  EXPECT_LT(encode_tiff(black).size(), 8000U);
+  EXPECT_TRUE(same_pixels(black, decode_tiff(encode_tiff(black), "f.tif").pixels));
+}
+
+// Only the strips that hold wanted rows are decoded; those rows are what they are.
+TEST(Tiff, DecodesOnlyTheRowsThatAreWanted) {
+  ImageU16 image(512, 1024, 1);
+  for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<std::uint16_t>(1 + i % 4000);
+  const auto part = std::get<ImageU16>(decode_tiff(encode_tiff(image), "f.tif", {300, 420}).pixels);
+  ASSERT_EQ(part.height, image.height);
+  for (int y = 300; y < 420; ++y)
+    ASSERT_TRUE(std::equal(image.row(y).begin(), image.row(y).end(), part.row(y).begin())) << y;
+  EXPECT_EQ(part.at(5, 0), 0);
+  EXPECT_EQ(part.at(5, 1023), 0);
+}
+
 TEST(Tiff, EveryTruncationIsAnErrorThatNamesTheFile) {
   const std::string whole = encode_tiff(random_codes(64, 64, 1, 12));
   for (std::size_t size = 0; size < whole.size(); size += 97)
@@ -49,6 +103,27 @@ TEST(Tiff, DamageIsReadOrRefusedAndNothingElse) {
         continue;
       }
     }
+}
+
+TEST(Tiff, OtherInflatersReadNoise) {
+  const std::string program =
+      "import sys, numpy as np; d = sys.argv[1] + '/'\n"
+      "b = np.fromfile(d + 'noise.raw', np.uint16).reshape(300, 400)\n"
+      "if sys.argv[2] == 'cv2': import cv2; a = cv2.imread(d + 'noise.tif', -1)\n"
+      "else: import PIL.Image; a = np.array(PIL.Image.open(d + 'noise.tif'))\n"
+      "assert (a == b).all()";
+  const test::TemporaryFolder folder;
+  const ImageU16 codes = camera_codes(400, 300, 8000);
+  write_bytes(folder / "noise.tif", encode_tiff(codes));
+  write_bytes(folder / "noise.raw", {reinterpret_cast<const char*>(codes.data.data()), codes.data.size() * 2});
+  int readers = 0;
+  for (const std::string reader : {"cv2", "PIL"}) {
+    if (test::run_command({"/usr/bin/python3", "-c", "import numpy, " + reader}).exit_code != 0) continue;
+    const auto outcome = test::run_command({"/usr/bin/python3", "-c", program, folder.path().string(), reader});
+    EXPECT_EQ(outcome.exit_code, 0) << reader << ": " << outcome.err;
+    ++readers;
+  }
+  if (readers == 0) GTEST_SKIP() << "neither python3-opencv nor python3-pil";
 }
 
 TEST(Tiff, OpenCvReadsWhatIsWritten) {

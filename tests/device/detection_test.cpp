@@ -9,6 +9,7 @@
 #include <ctime>
 #include <iostream>
 #include <mutex>
+#include <random>
 
 #include "common/demosaic.h"
 #include "common/error.h"
@@ -23,8 +24,11 @@ using test::add_errors;
 using test::CornerErrors;
 using test::RenderedFrames;
 
+constexpr double knee = 0.05;  // a sensor that is logarithmic from a tenth of the paper's light on
+
 const RenderedFrames& rendered() {
-  static const RenderedFrames frames = test::rendered_frames(512, 3, 8, 0.05);
+  static const RenderedFrames frames =
+      exposed(test::rendered_views(512, 3, 8), {PixelLayout::bayer_rg, 12, false}, knee);
   return frames;
 }
 
@@ -96,46 +100,94 @@ TEST(FrameLevels, ABoxIsThatPartOfTheFrame) {
 }
 
 // A dark square on bright paper, turned and antialiased, blurred by nothing else.
-TEST(EdgeAlignment, FindsTheCornersOfASquare) {
-  const Eigen::Vector2d centre(40.3, 37.8);
-  const double turn = 0.3, half = 17.4;
+struct Square {
+  ImageF picture{80, 80, 1};
+  QuadCorners corners;
+};
+
+Square turned_square(const Eigen::Vector2d& centre, double turn) {
+  constexpr double half = 17.4;
   const Eigen::Vector2d u(std::cos(turn), std::sin(turn)), v(-u.y(), u.x());
-  ImageF picture(80, 80, 1);
+  Square out;
   constexpr int fine = 16;
   for (int y = 0; y < 80; ++y)
     for (int x = 0; x < 80; ++x)
       for (int i = 0; i < fine * fine; ++i) {
         const Eigen::Vector2d p(x + (i % fine + 0.5) / fine, y + (i / fine + 0.5) / fine);
         const bool dark = std::abs((p - centre).dot(u)) < half && std::abs((p - centre).dot(v)) < half;
-        picture.at(x, y) += (dark ? 0.05F : 0.75F) / (fine * fine);
+        out.picture.at(x, y) += (dark ? 0.05F : 0.75F) / (fine * fine);
       }
-  QuadCorners truth{centre - half * u + half * v, centre + half * u + half * v, centre + half * u - half * v,
-                    centre - half * u - half * v};
-  QuadCorners start = truth;
-  for (Eigen::Vector2d& corner : start) corner += 0.05 * (centre - corner) + Eigen::Vector2d(0.3, -0.4);
-  const std::optional<QuadCorners> found = align_edges(picture, start, 2);
-  ASSERT_TRUE(found);
-  for (std::size_t k = 0; k < 4; ++k) EXPECT_LT(((*found)[k] - truth[k]).norm(), 0.02) << k;
-  EXPECT_FALSE(align_edges(ImageF(80, 80, 1, 0.5F), start, 2));
-  for (Eigen::Vector2d& corner : start) corner += Eigen::Vector2d(30, 0);
-  EXPECT_FALSE(align_edges(picture, start, 2));
+  out.corners = {centre - half * u + half * v, centre + half * u + half * v, centre + half * u - half * v,
+                 centre - half * u - half * v};
+  return out;
 }
 
-TEST(FrameDetector, FindsTheTagsWhereTruthSaysTheyAre) {
-  const RenderedFrames& r = rendered();
-  const ResponseCurve raw = linear_response(12, 64, 1, 3);  // the codes taken for light
-  CornerErrors linear, codes;
-  FrameDetector on_linear({}, r.response, r.format), on_codes({}, raw, r.format);
-  for (std::size_t i = 0; i < r.frames.size(); ++i) {
-    add_errors(r, i, on_linear.detect(r.frames[i]).tags, linear);
-    add_errors(r, i, on_codes.detect(r.frames[i]).tags, codes);
+TEST(EdgeAlignment, FindsTheCornersOfASquare) {
+  const Eigen::Vector2d centre(40.3, 37.8);
+  const Square square = turned_square(centre, 0.3);
+  QuadCorners start = square.corners;
+  for (Eigen::Vector2d& corner : start) corner += 0.05 * (centre - corner) + Eigen::Vector2d(0.3, -0.4);
+  const std::optional<QuadCorners> found = align_edges(square.picture, start, 2);
+  ASSERT_TRUE(found);
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_LT(((*found)[k] - square.corners[k]).norm(), 0.02) << k;
+  EXPECT_FALSE(align_edges(ImageF(80, 80, 1, 0.5F), start, 2));
+  for (Eigen::Vector2d& corner : start) corner += Eigen::Vector2d(30, 0);
+  EXPECT_FALSE(align_edges(square.picture, start, 2));
+}
+
+// Noise of a fifth of the light.
+TEST(EdgeAlignment, NoiseBesideAnEdgeDoesNotPullIt) {
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal;
+  double squares = 0;
+  constexpr int squares_count = 40;
+  for (int i = 0; i < squares_count; ++i) {
+    Square square = turned_square({40 + 0.13 * (i % 7), 40 - 0.17 * (i % 5)}, 0.04 * i);
+    for (float& light : square.picture.data) light *= 1 + 0.2F * normal(random);
+    const std::optional<QuadCorners> found = align_edges(square.picture, square.corners, 3);
+    ASSERT_TRUE(found) << i;
+    for (std::size_t k = 0; k < 4; ++k) squares += ((*found)[k] - square.corners[k]).squaredNorm();
   }
-  std::cout << "corner RMS linearized " << linear.rms_px << " px (" << linear.tags << " of " << linear.tags_in_sight
-            << " tags), on raw codes " << codes.rms_px << " px (" << codes.tags << ")\n";
-  EXPECT_GT(linear.tags, 0.85 * linear.tags_in_sight);
-  EXPECT_LE(linear.false_tags, 1);
-  EXPECT_LE(linear.rms_px, 0.2);  // 0.10 is asked for at 1024²: tests/bench/bench_detection.cpp
-  EXPECT_LT(linear.rms_px, 0.8 * codes.rms_px);
+  const double rms_px = std::sqrt(squares / (4 * squares_count));
+  std::cout << "corner RMS " << rms_px << " px\n";
+  EXPECT_LT(rms_px, 0.10);
+}
+
+// Corners against the simulator's truth, of a detector that knows the response or takes the codes for light.
+CornerErrors errors_of(const RenderedFrames& r, const ResponseCurve& response) {
+  CornerErrors out;
+  FrameDetector detector({}, response, r.format);
+  for (std::size_t i = 0; i < r.frames.size(); ++i) add_errors(r, i, detector.detect(r.frames[i]).tags, out);
+  return out;
+}
+
+// 0.10 px at 1024² is what the rig asks for, whatever its camera; the raw codes stand beside it.
+TEST(FrameDetector, FindsTheCornersToATenthOfAPixel) {
+  const test::RenderedViews views = test::rendered_views(1024, 2, 16);
+  for (const PixelLayout layout : {PixelLayout::mono, PixelLayout::bayer_rg, PixelLayout::bayer_gb})
+    for (const int bits : {10, 12}) {
+      const RenderedFrames r = exposed(views, {layout, bits, false}, knee);
+      const std::string format = pixel_format_name(r.format);
+      const CornerErrors linear = errors_of(r, r.response);
+      const CornerErrors codes =
+          errors_of(r, linear_response(bits, r.response.black_level, 1, r.format.colour_channels()));
+      std::cout << format << ": corner RMS linearized " << linear.rms_px << " px (" << linear.tags << " tags, "
+                << linear.tags_in_sight << " of the mirror in sight), on raw codes " << codes.rms_px << " px ("
+                << codes.tags << ")\n";
+      EXPECT_LE(linear.rms_px, 0.10) << format;
+      EXPECT_LT(linear.rms_px, 0.5 * codes.rms_px) << format;
+      EXPECT_GE(linear.tags, linear.tags_in_sight) << format;
+      EXPECT_EQ(linear.false_tags, 0) << format;
+    }
+}
+
+// Tags of 22 pixels, and more noise.
+TEST(FrameDetector, FindsSmallTags) {
+  const CornerErrors found = errors_of(rendered(), rendered().response);
+  std::cout << "corner RMS at 512² " << found.rms_px << " px (" << found.tags << " tags)\n";
+  EXPECT_GT(found.tags, 0.85 * found.tags_in_sight);
+  EXPECT_LE(found.false_tags, 1);
+  EXPECT_LE(found.rms_px, 0.15);
 }
 
 // A hand's motion, the frame shifted step by step: near searches find what full ones find.

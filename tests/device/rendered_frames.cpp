@@ -12,35 +12,44 @@
 
 namespace mf::test {
 
-RenderedFrames rendered_frames(int size, int count, int samples, double knee) {
-  RenderedFrames out;
+RenderedViews rendered_views(int size, int count, int samples) {
+  RenderedViews out;
   const sim::Scene scene = sim::desk_scene(1);
-  const sim::MirrorPlate plate(sim::desk_mirror(), 0.92);
+  const sim::MirrorPlate plate(sim::desk_mirror(), sim::mirror_reflectance);
   const sim::Tracer tracer(scene, &plate);
-  sim::Sensor sensor;
-  constexpr double exposure_s = 0.01;
-  sensor.response = linlog_response(12, 64, knee * exposure_s, 800 * exposure_s, 3);
   out.camera = sim::desk_camera(size);
   out.mirror = plate.target();
   out.world = scene.world;
   out.cam_from_world = sim::desk_cam_from_world(0);
-  out.response = sensor.response;
-  out.format = sensor.format;
   const sim::MotionInput input{out.cam_from_world.inverse().translation, scene.lamp.centre_in_world.cast<double>(),
                                plate.half_size_m()};
   constexpr int of_motion = 200;
   const std::vector<Rigid3> poses = sim::wave_mirror(input, of_motion, 1);
-  const sim::Region whole{0, 0, size, size};
   for (int i = 0; i < count; ++i) {
     // Spread over the motion's upper half: lower down, tags graze and leave the picture.
     const Rigid3& pose = poses[static_cast<std::size_t>(5 + i * 60 / count)];
     const auto seed = static_cast<std::uint64_t>(i) + 1;
-    CameraFrame frame;
-    frame.codes = sensor.expose(sim::render(tracer, {out.camera, out.cam_from_world, pose, whole, samples, seed, {}}),
-                                exposure_s, whole, seed);
-    frame.arrival.device_frame = i + 1;
-    out.frames.push_back(std::move(frame));
+    out.radiance.push_back(
+        sim::render(tracer, {out.camera, out.cam_from_world, pose, sim::whole(out.camera), samples, seed, {}}));
     out.cam_from_mirror.push_back(out.cam_from_world * pose);
+  }
+  return out;
+}
+
+RenderedFrames exposed(const RenderedViews& views, const PixelFormat& format, double knee) {
+  constexpr double exposure_s = 0.01, brightest = 800;
+  RenderedFrames out{views, {}, format, {}};
+  sim::Sensor sensor;
+  sensor.format = format;
+  const double black_level = format.level_count() / 64.0;
+  out.response = sensor.response =
+      linlog_response(format.bits, black_level, knee * exposure_s, brightest * exposure_s, format.colour_channels());
+  for (const ImageF& radiance : views.radiance) {
+    CameraFrame frame;
+    frame.arrival.device_frame = static_cast<std::int64_t>(out.frames.size()) + 1;
+    frame.codes = sensor.expose(radiance, exposure_s, sim::whole(views.camera),
+                                static_cast<std::uint64_t>(frame.arrival.device_frame));
+    out.frames.push_back(std::move(frame));
   }
   return out;
 }
@@ -49,7 +58,7 @@ namespace {
 
 using Corners = std::array<Eigen::Vector2d, 4>;
 
-std::optional<Corners> true_corners(const RenderedFrames& rendered, std::size_t frame, int id) {
+std::optional<Corners> true_corners(const RenderedViews& rendered, std::size_t frame, int id) {
   Corners out;
   if (const PlanarTag* tag = rendered.mirror.find(id)) {
     const auto corners = tag->corners_m();
@@ -68,7 +77,7 @@ std::optional<Corners> true_corners(const RenderedFrames& rendered, std::size_t 
 
 }  // namespace
 
-void add_errors(const RenderedFrames& rendered, std::size_t frame, const std::vector<TagDetection>& tags,
+void add_errors(const RenderedViews& rendered, std::size_t frame, const std::vector<TagDetection>& tags,
                 CornerErrors& sum) {
   double squares = sum.rms_px * sum.rms_px * sum.corners;
   for (const TagDetection& tag : tags) {

@@ -12,20 +12,27 @@
 
 namespace mf::test {
 
-// Path-traced frames of the simulator's waved mirror as its LinLog sensor (Bayer, 12 bits) codes them, with the truth.
-struct RenderedFrames {
+// Path-traced pictures of the simulator's waved mirror on its desk, with the truth.
+struct RenderedViews {
   CameraModel camera;
   MirrorTarget mirror;
   WorldTarget world;
   Rigid3 cam_from_world;
+  std::vector<Rigid3> cam_from_mirror;
+  std::vector<ImageF> radiance;  // three channels
+};
+// `size`: edge in pixels. All of the picture is traced, table and walls too. `samples` per pixel make the noise: with 8
+// of them far above a sensor's, a quarter of the paper's light in some places; with 32 half of that.
+[[nodiscard]] RenderedViews rendered_views(int size, int count, int samples);
+
+// The same as a LinLog sensor codes them.
+struct RenderedFrames : RenderedViews {
   ResponseCurve response;  // the sensor's true one
   PixelFormat format;
   std::vector<CameraFrame> frames;
-  std::vector<Rigid3> cam_from_mirror;
 };
-// `size`: edge in pixels. The whole frame is read out, table and walls too. `knee`: radiance from which on the sensor
-// is logarithmic; paper is at 0.2 to 1.
-[[nodiscard]] RenderedFrames rendered_frames(int size, int count, int samples, double knee);
+// `knee`: radiance from which on the sensor is logarithmic; paper is at 0.2 to 1.
+[[nodiscard]] RenderedFrames exposed(const RenderedViews&, const PixelFormat&, double knee);
 
 struct CornerErrors {
   double rms_px = 0;
@@ -34,6 +41,6 @@ struct CornerErrors {
   int false_tags = 0;  // no tag of the scene, or a corner more than 3 px off: pose estimation rejects these
 };
 // Of the mirror's and the world's tags.
-void add_errors(const RenderedFrames&, std::size_t frame, const std::vector<TagDetection>&, CornerErrors& sum);
+void add_errors(const RenderedViews&, std::size_t frame, const std::vector<TagDetection>&, CornerErrors& sum);
 
 }  // namespace mf::test

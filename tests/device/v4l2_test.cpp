@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <fstream>
 #include <thread>
 
@@ -386,6 +387,12 @@ TEST_F(V4l2Source, UnpluggedItIsLostAndStaysSo) {
   EXPECT_NO_THROW((void)open_v4l2_source(test::settings_for_rig()));
 }
 
+// How long a camera is away the nth time: mostly for a moment, every tenth time for half a second to half a minute.
+milliseconds away_for(int n) {
+  constexpr std::array<int, 5> long_ms{500, 2000, 5000, 12000, 30000};
+  return milliseconds(n % 10 == 4 ? long_ms.at(static_cast<std::size_t>(n / 10)) : 30 + 40 * (n % 7));
+}
+
 // How long after each return the first frame is in the session.
 TEST_F(V4l2Source, UnpluggedAgainAndAgainItReturnsIntoTheSameSession) {
   const int times = test::repetitions(5, 50);
@@ -398,7 +405,7 @@ TEST_F(V4l2Source, UnpluggedAgainAndAgainItReturnsIntoTheSameSession) {
       for (int wait = 0; wait < 500 && !streams(); ++wait) std::this_thread::sleep_for(milliseconds(10));
       std::this_thread::sleep_for(milliseconds(60 + 7 * (i % 5)));
       rig.camera.unplug();
-      std::this_thread::sleep_for(milliseconds(30 + 40 * (i % 7)));
+      std::this_thread::sleep_for(away_for(i));
       rig.camera.replug();
       returned_ns.push_back(clock_ns(CLOCK_MONOTONIC));
     }

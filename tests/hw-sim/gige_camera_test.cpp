@@ -5,6 +5,7 @@
 #include <arv.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <random>
@@ -12,10 +13,13 @@
 
 #include "common/error.h"
 #include "device/aravis_source.h"
+#include "device/camera_keeper.h"
 #include "device/capture.h"
+#include "device/clock.h"
 #include "hw-sim/gige_registers.h"
 #include "tests/device/scripted_camera.h"
 #include "tests/support/expect_input_error.h"
+#include "tests/support/full_counts.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mf::sim {
@@ -58,22 +62,19 @@ class GigeCameraTest : public testing::Test {
     s.socket_buffer_bytes = 4 << 20;
     return s;
   }
-  CaptureResult record(const GigeCameraOptions& o, double seconds) {
-    const std::atomic<bool> stop = false;
-    CaptureOptions options;
-    options.most_seconds = seconds;
-    return capture([&] { return open_aravis_source(client(o)); }, folder_ / "s", test::header_with_target(), options,
-                   stop);
+  CaptureResult record(const GigeCameraOptions& o, const std::atomic<bool>& stop) {
+    return capture([&] { return open_aravis_source(client(o)); }, folder_ / "s", test::header_with_target(), {}, stop);
   }
-  // Frames that differ from what the camera sent.
+  // Frames that differ from what the camera sent, of 200 that are looked at.
   int wrong_frames(const GigeCameraOptions& o) {
     const SessionReader reader(folder_ / "s");
     int wrong = 0;
-    for (const SessionFrame& frame : reader.frames())
-      wrong += std::get<ImageU16>(reader.read_frame(frame).pixels).data !=
-                       codes_of(static_cast<std::uint64_t>(frame.arrival->device_frame), o)
-                   ? 1
-                   : 0;
+    const std::size_t step = 1 + reader.frames().size() / 200;
+    for (std::size_t i = 0; i < reader.frames().size(); i += step) {
+      const SessionFrame& frame = reader.frames()[i];
+      const auto sent = static_cast<std::uint64_t>(frame.arrival->device_frame);
+      wrong += std::get<ImageU16>(reader.read_frame(frame).pixels).data != codes_of(sent, o) ? 1 : 0;
+    }
     return wrong;
   }
   test::TemporaryFolder folder_;
@@ -264,52 +265,104 @@ TEST_F(GigeCameraTest, ChunksTellTimeAndExposure) {
   g_object_unref(client);
 }
 
+// 0.1 % of the frames may be missing, and each of them must be accounted for.
 TEST_F(GigeCameraTest, LostPacketsAreAskedForAgain) {
-  GigeCameraOptions o = camera("127.0.3.2", "BayerRG12", 512, 512);
+  const int size_px = test::repetitions(512, 1024);
+  GigeCameraOptions o = camera("127.0.3.2", "BayerRG12", size_px, size_px);
   o.packet_loss = 0.01;
-  o.most_frames = 100;
-  const GigeCamera server(o, fill);
-  const CaptureResult result = record(o, 6);
+  o.most_frames = test::repetitions(200, 4000);
+  GigeCamera server(o, fill);
+  std::atomic<bool> stop = false;
+  std::thread watch([&] {
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(10 + o.most_frames / 5);
+    while (server.counts().frames < o.most_frames && std::chrono::steady_clock::now() < patience)
+      std::this_thread::sleep_for(milliseconds(50));
+    std::this_thread::sleep_for(milliseconds(800));  // what is still asked for again
+    stop = true;
+  });
+  const CaptureResult result = record(o, stop);
+  watch.join();
   const GigeCameraCounts counts = server.counts();
-  EXPECT_EQ(counts.frames, 100);
-  EXPECT_GT(counts.dropped, 200);
-  EXPECT_GT(counts.resent, 200);
-  // On a machine that stalls, frames can be lost for good: then they are counted.
+  EXPECT_EQ(counts.frames, o.most_frames);
+  EXPECT_GT(counts.dropped, 2 * o.most_frames);
   const SessionReader reader(folder_ / "s");
-  ASSERT_GT(reader.frames().size(), 50U);
-  EXPECT_EQ(result.recorder.durable, static_cast<std::int64_t>(reader.frames().size()));
-  EXPECT_GE(result.recorder.durable + result.recorder.lost, reader.frames().back().arrival->device_frame);
+  const auto complete = static_cast<std::int64_t>(reader.frames().size());
+  std::int64_t missing = 0;
+  for (const FrameGap& gap : reader.gaps()) missing += gap.missing;
+  ASSERT_GT(complete, 0);
+  const std::int64_t sent = reader.frames().back().arrival->device_frame - reader.frames()[0].arrival->device_frame + 1;
+  EXPECT_EQ(complete + missing, sent);
+  EXPECT_EQ(result.recorder.durable, complete);
+  EXPECT_GE(1000 * complete, 999 * sent);
   EXPECT_EQ(wrong_frames(o), 0);
+  std::printf("%d packets lost at first, %d sent again; %d of %d frames complete, %d in gap rows\n",
+              static_cast<int>(counts.dropped), static_cast<int>(counts.resent), static_cast<int>(complete),
+              static_cast<int>(sent), static_cast<int>(missing));
 }
 
+// How long after each return the first frame is in the session. A short death is noticed by nothing but its silence.
 TEST_F(GigeCameraTest, ADeadCameraComesBackIntoTheSameSession) {
-  GigeCameraOptions o = camera("127.0.3.3", "Mono8", 320, 240);
+  const std::vector<double> all_deaths_s{0.5, 1.7, 6, 0.8, 1,  1.3,  2,  2.5, 3,  3.5,
+                                         4,   4.5, 5, 7.5, 10, 12.5, 15, 20,  25, 30};
+  const std::size_t deaths = static_cast<std::size_t>(test::repetitions(3, static_cast<int>(all_deaths_s.size())));
+  const GigeCameraOptions o = camera("127.0.3.3", "Mono8", 320, 240);
   GigeCamera server(o, fill);
-  std::chrono::steady_clock::time_point revived;
+  std::vector<std::int64_t> returned_ns;
+  std::atomic<bool> stop = false;
   std::thread fate([&] {
-    std::this_thread::sleep_for(milliseconds(800));
-    server.die();
-    std::this_thread::sleep_for(milliseconds(6000));
-    server.revive();
-    revived = std::chrono::steady_clock::now();
+    const auto let_stream = [&] {
+      const std::int64_t before = server.counts().frames;
+      for (int wait = 0; wait < 1000 && server.counts().frames < before + 20; ++wait)
+        std::this_thread::sleep_for(milliseconds(10));
+    };
+    for (std::size_t i = 0; i < deaths; ++i) {
+      let_stream();
+      server.die();
+      std::this_thread::sleep_for(std::chrono::duration<double>(all_deaths_s[i]));
+      server.revive();
+      returned_ns.push_back(clock_ns(CLOCK_MONOTONIC));
+    }
+    let_stream();
+    stop = true;
   });
-  const CaptureResult result = record(o, 9);
+  record(o, stop);
   fate.join();
   const SessionReader reader(folder_ / "s");
-  bool lost = false;
-  std::int64_t back_ns = 0;
-  for (const FrameGap& gap : reader.gaps()) {
-    if (gap.reason != "the camera was lost") continue;
-    lost = true;
-    ASSERT_LT(gap.next_id, static_cast<std::int64_t>(reader.frames().size()));
-    back_ns = reader.frames()[static_cast<std::size_t>(gap.next_id)].arrival->monotonic_ns;
+  const auto lost = std::count_if(reader.gaps().begin(), reader.gaps().end(),
+                                  [](const FrameGap& gap) { return gap.reason == "the camera was lost"; });
+  EXPECT_EQ(lost, static_cast<std::ptrdiff_t>(deaths));
+  double slowest_s = 0;
+  for (std::size_t i = 0; i < deaths; ++i) {
+    const auto first = std::find_if(reader.frames().begin(), reader.frames().end(),
+                                    [&](const SessionFrame& f) { return f.arrival->monotonic_ns > returned_ns[i]; });
+    ASSERT_NE(first, reader.frames().end());
+    const double after_s = 1e-9 * static_cast<double>(first->arrival->monotonic_ns - returned_ns[i]);
+    std::printf("dead for %4.1f s, first frame %.2f s after it was back\n", all_deaths_s[i], after_s);
+    slowest_s = std::max(slowest_s, after_s);
   }
-  ASSERT_TRUE(lost);
-  EXPECT_GT(result.recorder.durable, 60);
-  const double after_s =
-      1e-9 * static_cast<double>(back_ns - std::chrono::nanoseconds(revived.time_since_epoch()).count());
-  std::printf("first frame %.2f s after the camera was back\n", after_s);
-  EXPECT_LT(after_s, 5);
+  EXPECT_LE(slowest_s, 1.0);
+}
+
+// Stopping needs nothing of the camera.
+TEST_F(GigeCameraTest, ADeadCameraDoesNotHoldUpTheStop) {
+  const GigeCameraOptions o = camera("127.0.3.6", "Mono8", 320, 240);
+  GigeCamera server(o, fill);
+  CameraKeeper keeper([&] { return open_aravis_source(client(o)); }, milliseconds(200));
+  CameraFrame frame;
+  frame.codes = ImageU16(o.width, o.height, 1);
+  double slowest_s = 0;
+  const auto died = std::chrono::steady_clock::now();
+  server.die();
+  bool lost = false;
+  for (double elapsed_s = 0; elapsed_s < 9;) {  // Aravis gives up after four to six seconds
+    const auto before = std::chrono::steady_clock::now();
+    lost |= keeper.receive(frame, milliseconds(100)) == Received::lost;
+    const auto after = std::chrono::steady_clock::now();
+    slowest_s = std::max(slowest_s, std::chrono::duration<double>(after - before).count());
+    elapsed_s = std::chrono::duration<double>(after - died).count();
+  }
+  EXPECT_TRUE(lost);
+  EXPECT_LT(slowest_s, 0.5);
 }
 
 TEST_F(GigeCameraTest, ASecondClientIsRefused) {

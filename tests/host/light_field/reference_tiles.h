@@ -13,8 +13,8 @@
 
 namespace mf::testing {
 
-// The definition of a light field's texel, without any grid, structure or approximation: the ray is projected into every
-// view, all views that see it are ranked, and the k best are blended. Emitters apart: those have their own rules.
+// The definition of a light field's texel, without any grid, structure or approximation: the ray is projected into
+// every view, all views that see it are ranked, and the k best are blended. Emitters apart: those have their own rules.
 class ReferenceTiles {
  public:
   ReferenceTiles(const std::vector<FieldView>& views, const LightField& field, int k)
@@ -31,8 +31,8 @@ class ReferenceTiles {
   [[nodiscard]] Eigen::Vector4f texel(std::size_t direction, int x, int y) {
     const Eigen::Vector3f p = point(x, y), d = to_world(field_.directions.directions[direction]);
     const bool plane = field_.surroundings.is_plane();
-    const ProxyPoint focus = plane ? ProxyPoint(p.homogeneous())
-                                   : proxy_point(p, d, field_.surroundings.inverse_distance_along(p, d));
+    const ProxyPoint focus =
+        plane ? ProxyPoint(p.homogeneous()) : proxy_point(p, d, field_.surroundings.inverse_distance_along(p, d));
     if (direction != cell_of_ || parts_.empty()) {
       parts_ = split_cell(field_.directions, direction, 1);
       cell_of_ = direction;
@@ -83,8 +83,7 @@ class ReferenceTiles {
   [[nodiscard]] Eigen::Vector4f look_at_cell(const FieldView& view, const Eigen::Vector3f& p, const ProxyPoint& focus,
                                              const std::vector<CellSample>& parts, std::size_t direction) const {
     if (!within_reach(view, focus, direction)) return Eigen::Vector4f::Zero();
-    const float part_angle =
-        std::sqrt(field_.directions.solid_angles_sr[direction] / static_cast<float>(parts.size()));
+    const float part_angle = std::sqrt(field_.directions.solid_angles_sr[direction] / static_cast<float>(parts.size()));
     const int level = level_for_angle(view, focus, part_angle);
     Eigen::Vector4f sum = Eigen::Vector4f::Zero();
     float solid_angle = 0;

@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "common/session.h"
-
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <mutex>
@@ -16,8 +12,10 @@
 #include "common/durable_file.h"
 #include "common/error.h"
 #include "common/file_bytes.h"
+#include "common/session.h"
 #include "common/session_checks.h"
 #include "common/session_header.h"
+#include "common/session_index.h"
 #include "common/sqlite.h"
 #include "common/tiff_image.h"
 
@@ -26,9 +24,6 @@ namespace mf {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::int64_t schema_version = 1;         // PRAGMA user_version
-constexpr std::int64_t application_id = 0x4d4652;  // "MFR", PRAGMA application_id: other programs' databases differ
 
 constexpr const char* schema = R"sql(
 PRAGMA application_id = 0x4d4652;
@@ -60,6 +55,10 @@ CREATE TABLE checks (
   frame INTEGER PRIMARY KEY REFERENCES frames (id),
   crc32 INTEGER NOT NULL
 );
+CREATE TABLE commits (
+  count INTEGER NOT NULL
+);
+INSERT INTO commits VALUES (0);
 CREATE TABLE document_checks (
   key   TEXT PRIMARY KEY REFERENCES meta (key),
   crc32 INTEGER NOT NULL
@@ -83,10 +82,6 @@ CREATE TABLE online_poses (
 );
 )sql";
 
-fs::path index_file(const fs::path& folder) {
-  return folder / "session.db";
-}
-
 void make_folder(const fs::path& folder) {
   std::error_code error;
   if (fs::create_directory(folder, error)) return;
@@ -94,16 +89,6 @@ void make_folder(const fs::path& folder) {
   throw InputError(folder.string(), "",
                    fmt::format("cannot be made ({}): check the parent folder, its permissions and the free space",
                                std::strerror(error.value())));
-}
-
-int channels_of(const FramePixels& pixels) {
-  return std::visit([](const auto& image) { return image.channels; }, pixels);
-}
-int width_of(const FramePixels& pixels) {
-  return std::visit([](const auto& image) { return image.width; }, pixels);
-}
-int height_of(const FramePixels& pixels) {
-  return std::visit([](const auto& image) { return image.height; }, pixels);
 }
 
 }  // namespace
@@ -126,12 +111,16 @@ struct SessionWriter::Impl {
   std::int64_t next_id = 0;  // the appending thread's own
   std::mutex index_mutex;
   std::optional<SqliteDatabase> index;
-  std::int64_t committed = 0;
+  std::int64_t committed = 0;  // frames
+  std::int64_t commits = 0;    // as in the table of this name
   std::atomic<std::int64_t> written_anew = 0;
 
   void write_under_new_names(SessionFrame&, const std::string& tiff, bool durable, const WriteError& first);
   void make_durable(std::vector<Pending>&);
   void begin();
+  // All that `insert` does, or nothing, is in the index when this returns.
+  template <typename Insert>
+  void commit(const Insert& insert);
   void write_document(const std::string& key, const nlohmann::json&);
   void insert(const std::vector<Pending>&);
   void insert(const std::vector<FrameGap>&);
@@ -140,7 +129,7 @@ struct SessionWriter::Impl {
 
 void SessionWriter::Impl::begin() {
   make_folder(folder / "frames");
-  index.emplace(index_file(folder), SqliteDatabase::Mode::create);
+  index.emplace(session_index_file(folder), SqliteDatabase::Mode::create);
   // FULL: a commit is on the disk when it returns, so a row is never lost after append() has told of it.
   index->run("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL; BEGIN");
   index->run(schema);
@@ -149,6 +138,24 @@ void SessionWriter::Impl::begin() {
   sync_path(folder);
   const fs::path whole = fs::absolute(folder);
   sync_path((whole.has_filename() ? whole : whole.parent_path()).parent_path());  // the session's own name
+}
+
+template <typename Insert>
+void SessionWriter::Impl::commit(const Insert& insert) {
+  index->run("BEGIN");
+  try {
+    insert();
+    index->run("UPDATE commits SET count = count + 1");
+    index->run("COMMIT");
+  } catch (...) {
+    index->run_quietly("ROLLBACK");
+    throw;
+  }
+  ++commits;
+  try {
+    note_commits(folder, commits);
+  } catch (const WriteError&) {  // what is not noted is only not missed, and the disk's state is told of by the frames
+  }
 }
 
 void SessionWriter::Impl::write_document(const std::string& key, const nlohmann::json& document) {
@@ -231,11 +238,7 @@ SessionWriter::SessionWriter(SessionWriter&&) noexcept = default;
 SessionWriter::~SessionWriter() = default;
 
 EncodedFrame SessionWriter::encode(const Frame& frame, TiffCompression compression) const {
-  const SessionHeader& header = impl_->header;
-  check(std::holds_alternative<ImageF>(frame.pixels) == header.format.linear_float, "frame has the session's type");
-  check(channels_of(frame.pixels) == header.format.stored_channels(), "frame has the session's channels");
-  check(width_of(frame.pixels) == header.width && height_of(frame.pixels) == header.height,
-        "frame has the session's size");
+  check(shape_of(frame.pixels) == shape_of(impl_->header), "frame has the session's type, size and channels");
   return {frame.info, encode_tiff(frame.pixels, compression), std::nullopt};
 }
 
@@ -290,7 +293,7 @@ void SessionWriter::Impl::make_durable(std::vector<Pending>& frames) {
   for (Pending& p : frames) {
     if (p.durable) continue;
     try {
-      sync_path(folder / p.frame.file);
+      sync_path(folder / p.frame.file, options.read_later ? AfterSync::drop : AfterSync::keep);
     } catch (const WriteError& e) {
       write_under_new_names(p.frame, p.tiff, true, e);
     }
@@ -322,16 +325,11 @@ std::int64_t SessionWriter::commit() {
   }
   if (frames.empty() && gaps.empty() && tags.empty()) return impl_->committed;
   impl_->make_durable(frames);
-  impl_->index->run("BEGIN");  // all rows or none
-  try {
+  impl_->commit([&] {
     impl_->insert(frames);
     impl_->insert(gaps);
     impl_->insert(tags);
-    impl_->index->run("COMMIT");
-  } catch (...) {
-    impl_->index->run_quietly("ROLLBACK");
-    throw;
-  }
+  });
   impl_->committed += static_cast<std::int64_t>(frames.size());
   return impl_->committed;
 }
@@ -339,14 +337,7 @@ std::int64_t SessionWriter::commit() {
 void SessionWriter::write_document(const std::string& key, const nlohmann::json& document) {
   const std::lock_guard lock(impl_->index_mutex);
   check(impl_->index.has_value(), "nothing is written to a finished session");
-  impl_->index->run("BEGIN");
-  try {
-    impl_->write_document(key, document);
-    impl_->index->run("COMMIT");
-  } catch (...) {
-    impl_->index->run_quietly("ROLLBACK");
-    throw;
-  }
+  impl_->commit([&] { impl_->write_document(key, document); });
 }
 
 void SessionWriter::finish() {
@@ -357,211 +348,8 @@ void SessionWriter::finish() {
   index.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode = DELETE");
   index.close();
   impl_->index.reset();
+  forget_commits(impl_->folder);
   sync_path(impl_->folder);
-}
-
-struct SessionReader::Impl {
-  fs::path folder;
-  SessionHeader header;
-  std::map<std::string, nlohmann::json> documents;
-  std::vector<SessionFrame> frames;
-  std::vector<FrameGap> gaps;
-
-  void read_header(const SqliteDatabase&);
-  void read_frames(const SqliteDatabase&);
-  void read_arrivals(const SqliteDatabase&);
-  void read_gaps(const SqliteDatabase&);
-  void check_documents(const SqliteDatabase&) const;
-  void check_rows(const SqliteDatabase&);
-};
-
-// Sessions from before recorders have no arrivals and no gaps.
-bool has_table(const SqliteDatabase& index, const std::string& name) {
-  SqliteStatement statement(index, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?");
-  statement.bind(1, name);
-  return statement.step();
-}
-
-void SessionReader::Impl::read_header(const SqliteDatabase& index) {
-  const auto pragma = [&](const char* sql) {
-    SqliteStatement statement(index, sql);
-    return statement.step() ? statement.integer(0) : 0;
-  };
-  if (pragma("PRAGMA application_id") != application_id)
-    throw InputError(index.file(), "", "is no index of a session: give a folder that import or the recorder made");
-  if (const std::int64_t version = pragma("PRAGMA user_version"); version != schema_version)
-    throw InputError(
-        index.file(), "user_version",
-        fmt::format("is {}, this program reads {}: use the version that wrote it", version, schema_version));
-  SqliteStatement verdict(index, "PRAGMA quick_check(1)");
-  if (!verdict.step() || verdict.text(0) != "ok")
-    throw InputError(index.file(), "", fmt::format("is damaged ({}): restore it from a copy", verdict.text(0)));
-  check_documents(index);
-  SqliteStatement rows(index, "SELECT key, json FROM meta");
-  while (rows.step()) {
-    try {
-      documents[rows.text(0)] = nlohmann::json::parse(rows.text(1));
-    } catch (const nlohmann::json::exception& e) {
-      throw InputError(index.file(), rows.text(0), fmt::format("is no JSON ({}): restore it from a copy", e.what()));
-    }
-  }
-  header = session_header_from_json(documents, index.file());
-}
-
-void SessionReader::Impl::read_frames(const SqliteDatabase& index) {
-  SqliteStatement rows(index,
-                       "SELECT id, role, name, exposure_s, nd_density, time_s, file, bytes, crc32 FROM frames "
-                       "ORDER BY id");
-  while (rows.step()) {
-    SessionFrame frame;
-    frame.id = rows.integer(0);
-    const std::optional<FrameRole> role = parse_frame_role(rows.text(1));
-    if (!role) throw InputError(index.file(), fmt::format("frames[{}].role", frame.id), "is unknown: it is damaged");
-    frame.info = {rows.text(2), *role, rows.real(3), rows.real(4), rows.real(5)};
-    frame.file = rows.text(6);
-    frame.bytes = rows.integer(7);
-    frame.crc32 = static_cast<std::uint32_t>(rows.integer(8));
-    frames.push_back(std::move(frame));
-  }
-}
-
-void SessionReader::Impl::read_arrivals(const SqliteDatabase& index) {
-  if (!has_table(index, "arrivals")) return;
-  std::map<std::int64_t, FrameArrival> arrivals;
-  SqliteStatement rows(index, "SELECT frame, device_frame, device_ns, monotonic_ns, realtime_ns FROM arrivals");
-  while (rows.step()) arrivals[rows.integer(0)] = {rows.integer(1), rows.integer(2), rows.integer(3), rows.integer(4)};
-  for (SessionFrame& frame : frames)
-    if (const auto found = arrivals.find(frame.id); found != arrivals.end()) frame.arrival = found->second;
-}
-
-void SessionReader::Impl::read_gaps(const SqliteDatabase& index) {
-  if (!has_table(index, "gaps")) return;
-  SqliteStatement rows(index, "SELECT next_id, missing, monotonic_ns, reason FROM gaps ORDER BY next_id, rowid");
-  while (rows.step()) gaps.push_back({rows.integer(0), rows.integer(1), rows.integer(2), rows.text(3)});
-}
-
-// Sessions from before there were checks are not checked.
-void SessionReader::Impl::check_documents(const SqliteDatabase& index) const {
-  if (!has_table(index, "document_checks")) return;
-  SqliteStatement rows(index, "SELECT meta.key, json, crc32 FROM meta LEFT JOIN document_checks USING (key)");
-  while (rows.step())
-    if (std::int64_t{crc32(rows.text(1))} != rows.integer(2))
-      throw InputError(index.file(), rows.text(0), "is damaged (its checksum differs): restore it from a copy");
-}
-
-void SessionReader::Impl::check_rows(const SqliteDatabase& index) {
-  if (!has_table(index, "checks")) return;
-  std::map<std::int64_t, std::int64_t> checks;
-  SqliteStatement rows(index, "SELECT frame, crc32 FROM checks");
-  while (rows.step()) checks[rows.integer(0)] = rows.integer(1);
-  for (SessionFrame& frame : frames) {
-    const auto found = checks.find(frame.id);
-    frame.damaged = found == checks.end() || found->second != std::int64_t{row_check(frame)};
-  }
-}
-
-SessionReader::SessionReader(fs::path folder) : impl_(std::make_unique<Impl>()) {
-  impl_->folder = std::move(folder);
-  const fs::path index_path = index_file(impl_->folder);
-  std::error_code error;
-  const bool found = fs::is_regular_file(index_path, error);
-  if (error && error != std::errc::no_such_file_or_directory && error != std::errc::not_a_directory)
-    throw InputError(index_path.string(), "",
-                     fmt::format("cannot be opened ({}): check its permissions", error.message()));
-  if (!found)
-    throw InputError(impl_->folder.string(), "",
-                     "is no session (it holds no session.db): give a folder that import or the recorder made");
-  const SqliteDatabase index(index_path, SqliteDatabase::Mode::read_only);
-  impl_->read_header(index);
-  impl_->read_frames(index);
-  impl_->read_arrivals(index);
-  impl_->read_gaps(index);
-  impl_->check_rows(index);
-}
-
-SessionReader::SessionReader(SessionReader&&) noexcept = default;
-SessionReader::~SessionReader() = default;
-
-const fs::path& SessionReader::folder() const {
-  return impl_->folder;
-}
-const SessionHeader& SessionReader::header() const {
-  return impl_->header;
-}
-const std::vector<SessionFrame>& SessionReader::frames() const {
-  return impl_->frames;
-}
-
-const std::vector<FrameGap>& SessionReader::gaps() const {
-  return impl_->gaps;
-}
-
-std::int64_t SessionReader::frames_without_row() const {
-  return std::max<std::int64_t>(count_frame_files(impl_->folder) - static_cast<std::int64_t>(impl_->frames.size()), 0);
-}
-
-std::optional<nlohmann::json> SessionReader::document(const std::string& key) const {
-  const auto found = impl_->documents.find(key);
-  return found == impl_->documents.end() ? std::nullopt : std::optional(found->second);
-}
-
-std::vector<FrameTags> SessionReader::tags() const {
-  const SqliteDatabase index(index_file(impl_->folder), SqliteDatabase::Mode::read_only);
-  std::map<std::int64_t, FrameTags> seen;
-  if (!has_table(index, "detections")) return {};
-  SqliteStatement tag_rows(index, "SELECT * FROM detections ORDER BY frame, tag");
-  while (tag_rows.step()) {
-    TagDetection tag;
-    tag.id = static_cast<int>(tag_rows.integer(1));
-    for (int corner = 0; corner < 4; ++corner)
-      tag.corners_px[static_cast<std::size_t>(corner)] = {tag_rows.real(2 + 2 * corner), tag_rows.real(3 + 2 * corner)};
-    seen[tag_rows.integer(0)].tags.push_back(tag);
-  }
-  SqliteStatement pose_rows(index, "SELECT * FROM online_poses");
-  while (pose_rows.step())
-    seen[pose_rows.integer(0)].cam_from_mirror =
-        Rigid3{Eigen::Quaterniond(pose_rows.real(1), pose_rows.real(2), pose_rows.real(3), pose_rows.real(4)),
-               {pose_rows.real(5), pose_rows.real(6), pose_rows.real(7)}};
-  std::vector<FrameTags> list;
-  for (auto& [frame, tags] : seen) {
-    tags.frame = frame;
-    list.push_back(std::move(tags));
-  }
-  return list;
-}
-
-std::vector<SessionFrame> SessionReader::frames(FrameRole role) const {
-  std::vector<SessionFrame> chosen;
-  std::copy_if(impl_->frames.begin(), impl_->frames.end(), std::back_inserter(chosen),
-               [&](const SessionFrame& frame) { return frame.info.role == role; });
-  return chosen;
-}
-
-Frame SessionReader::read_frame(const SessionFrame& frame, const RowRange& rows) const {
-  const fs::path path = impl_->folder / frame.file;
-  if (frame.damaged)
-    throw InputError(index_file(impl_->folder).string(), fmt::format("frames[{}]", frame.id),
-                     "is damaged (its checksum differs): restore the index from a copy");
-  const std::string bytes = read_file_bytes(path);
-  const auto stored = static_cast<std::int64_t>(bytes.size());
-  if (stored != frame.bytes)
-    throw InputError(path.string(), "",
-                     fmt::format("is {} ({} bytes, the index says {}): copy or record it again",
-                                 stored < frame.bytes ? "truncated" : "damaged", stored, frame.bytes));
-  if (crc32(bytes) != frame.crc32)
-    throw InputError(path.string(), "", "is damaged or was changed (its checksum differs from the index): restore it");
-  Frame read{frame.info, decode_tiff(bytes, path.string(), rows).pixels};
-  const SessionHeader& header = impl_->header;
-  if (width_of(read.pixels) != header.width || height_of(read.pixels) != header.height)
-    throw InputError(path.string(), "",
-                     fmt::format("has {} x {} pixels, the session {} x {}: restore it from a copy",
-                                 width_of(read.pixels), height_of(read.pixels), header.width, header.height));
-  if (channels_of(read.pixels) != header.format.stored_channels() ||
-      std::holds_alternative<ImageF>(read.pixels) != header.format.linear_float)
-    throw InputError(
-        path.string(), "",
-        fmt::format("is no {} picture as the session says: restore it from a copy", pixel_format_name(header.format)));
-  return read;
 }
 
 }  // namespace mf
