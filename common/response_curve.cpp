@@ -91,9 +91,6 @@ ResponseCurve linlog_response(int bits, double black_level, double knee, double 
   });
 }
 
-namespace {
-
-// code → radiance in single precision, everything that is constant over a frame multiplied in.
 std::vector<float> radiance_table(const ResponseCurve& curve, int channel, double effective_exposure_s) {
   const std::vector<double>& exposure = channel_of(curve, channel).exposure;
   const double scale = curve.radiance_scale.at(static_cast<std::size_t>(channel)) / effective_exposure_s;
@@ -104,6 +101,8 @@ std::vector<float> radiance_table(const ResponseCurve& curve, int channel, doubl
     table[code] = static_cast<float>(scale * std::min(exposure[code], ceiling));
   return table;
 }
+
+namespace {
 
 // Pixels of one row, `tables` repeating along it (1: mono, 2: a Bayer row, 3: red, green, blue).
 void look_up_row(std::span<const std::uint16_t> codes, std::span<const std::vector<float>* const> tables,

@@ -49,6 +49,9 @@ struct ResponseCurve {
 // are only divided by the exposure. Pixels at or above saturation keep the radiance of the saturation code.
 [[nodiscard]] ImageF linearize(const Frame&, const PixelFormat&, const ResponseCurve&);
 
+// Code → radiance in one colour of a frame: what linearize() looks up, before vignetting.
+[[nodiscard]] std::vector<float> radiance_table(const ResponseCurve&, int channel, double effective_exposure_s);
+
 // response.json. Throws InputError naming file and field.
 [[nodiscard]] nlohmann::json to_json(const ResponseCurve&);
 [[nodiscard]] ResponseCurve response_curve_from_json(const nlohmann::json&, const std::string& file);

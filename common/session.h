@@ -147,8 +147,8 @@ class SessionReader {
   // What was seen while recording, by frame; not every frame was looked at, and imported ones never. Throws InputError.
   [[nodiscard]] std::vector<FrameTags> tags() const;
   // Throws InputError naming the file when it is missing, truncated, damaged or of another size, or the index when the
-  // frame's row is damaged.
-  [[nodiscard]] Frame read_frame(const SessionFrame&) const;
+  // frame's row is damaged. Pixels outside of `rows` may be 0.
+  [[nodiscard]] Frame read_frame(const SessionFrame&, const RowRange& rows = {}) const;
 
  private:
   struct Impl;

@@ -233,7 +233,7 @@ std::vector<SessionFrame> SessionReader::frames(FrameRole role) const {
   return chosen;
 }
 
-Frame SessionReader::read_frame(const SessionFrame& frame) const {
+Frame SessionReader::read_frame(const SessionFrame& frame, const RowRange& rows) const {
   const fs::path path = impl_->folder / frame.file;
   if (frame.damaged)
     throw InputError(session_index_file(impl_->folder).string(), fmt::format("frames[{}]", frame.id),
@@ -246,7 +246,7 @@ Frame SessionReader::read_frame(const SessionFrame& frame) const {
                                  stored < frame.bytes ? "truncated" : "damaged", stored, frame.bytes));
   if (crc32(bytes) != frame.crc32)
     throw InputError(path.string(), "", "is damaged or was changed (its checksum differs from the index): restore it");
-  Frame read{frame.info, decode_tiff(bytes, path.string()).pixels};
+  Frame read{frame.info, decode_tiff(bytes, path.string(), rows).pixels};
   const SessionHeader& header = impl_->header;
   const FrameShape shape = shape_of(read.pixels), expected = shape_of(header);
   if (shape.width != expected.width || shape.height != expected.height)

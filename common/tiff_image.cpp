@@ -204,15 +204,19 @@ void copy_block(const std::vector<unsigned char>& block, const Layout& layout, s
 }
 
 template <typename Stored, typename Pixel>
-Image<Pixel> read_blocks(TIFF* tiff, const Layout& layout, const MemoryFile& memory, const std::string& file) {
+Image<Pixel> read_blocks(TIFF* tiff, const Layout& layout, const RowRange& wanted, const MemoryFile& memory,
+                         const std::string& file) {
   Image<Pixel> image(static_cast<int>(layout.width), static_cast<int>(layout.height), layout.channels);
   const tmsize_t block_size = layout.tiled ? TIFFTileSize(tiff) : TIFFStripSize(tiff);
   std::vector<unsigned char> block(static_cast<std::size_t>(std::max<tmsize_t>(block_size, 0)));
   const tmsize_t row_size = layout.tiled ? TIFFTileRowSize(tiff) : TIFFScanlineSize(tiff);
   const int planes = layout.separate_planes ? layout.channels : 1;
+  const auto is_wanted = [&](std::uint32_t y) {
+    return std::int64_t{y} + layout.block_height > wanted.begin && std::int64_t{y} < wanted.end;
+  };
   for (int plane = 0; plane < planes; ++plane)
     for (std::uint32_t y = 0; y < layout.height; y += layout.block_height)
-      for (std::uint32_t x = 0; x < layout.width; x += layout.block_width) {
+      for (std::uint32_t x = 0; is_wanted(y) && x < layout.width; x += layout.block_width) {
         const auto sample = static_cast<std::uint16_t>(plane);
         const tmsize_t got =
             layout.tiled ? TIFFReadEncodedTile(tiff, TIFFComputeTile(tiff, x, y, 0, sample), block.data(), block_size)
@@ -313,7 +317,7 @@ std::string encode(const Image<Pixel>& image, TiffCompression compression) {
 
 }  // namespace
 
-StoredImage decode_tiff(std::string_view bytes, const std::string& file) {
+StoredImage decode_tiff(std::string_view bytes, const std::string& file, const RowRange& rows) {
   MemoryFile memory;
   memory.source = bytes;
   const TiffHandle tiff = open_tiff(memory);
@@ -321,10 +325,10 @@ StoredImage decode_tiff(std::string_view bytes, const std::string& file) {
     refuse(file, fmt::format("is no TIFF, or is damaged ({}): copy or record it again", memory.error));
   const Layout layout = read_layout(tiff.get(), file);
   if (layout.format == SAMPLEFORMAT_IEEEFP)
-    return {read_blocks<float, float>(tiff.get(), layout, memory, file), layout.bits};
+    return {read_blocks<float, float>(tiff.get(), layout, rows, memory, file), layout.bits};
   if (layout.bits == 8)
-    return {read_blocks<std::uint8_t, std::uint16_t>(tiff.get(), layout, memory, file), layout.bits};
-  return {read_blocks<std::uint16_t, std::uint16_t>(tiff.get(), layout, memory, file), layout.bits};
+    return {read_blocks<std::uint8_t, std::uint16_t>(tiff.get(), layout, rows, memory, file), layout.bits};
+  return {read_blocks<std::uint16_t, std::uint16_t>(tiff.get(), layout, rows, memory, file), layout.bits};
 }
 
 std::string encode_tiff(const FramePixels& pixels, TiffCompression compression) {

@@ -34,6 +34,7 @@ float visibility(int i, Point point) {
 vec3 radiance(int i, Point point) {
   vec3 w = lights[i].direction.xyz;
   vec2 p = point.x.xy - w.xy * (point.x.z / w.z);
+  vec4 plane = lights[i].plane;
   vec2 at = vec2((p.x - plane.x) * plane.z, (plane.y - p.y) * plane.w);
   return texture(tiles, vec3(at, lights[i].image.x)).rgb;
 }

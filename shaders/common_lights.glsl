@@ -7,10 +7,10 @@ struct Light {
   vec4 shadow_v;         // likewise v
   vec4 shadow_depth;     // likewise depth, 0 nearest to the light, 1 farthest
   vec4 image;            // x: layer of the tile, y: size of a shadow map's texel in metres
+  vec4 plane;            // the tile's rectangle: min x, max y, 1 / width, 1 / height
 };
 
 layout(std140) uniform LightBlock {
   Light lights[max_lights];
-  vec4 plane;            // the tiles' rectangle: min x, max y, 1 / width, 1 / height
   ivec4 count;           // x: lights in this batch
 };

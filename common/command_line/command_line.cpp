@@ -78,6 +78,7 @@ template void CommandLine::option(const std::string&, std::uint64_t&, const std:
 template void CommandLine::option(const std::string&, double&, const std::string&, Presence);
 template void CommandLine::option(const std::string&, std::string&, const std::string&, Presence);
 template void CommandLine::option(const std::string&, std::filesystem::path&, const std::string&, Presence);
+template void CommandLine::option(const std::string&, std::optional<int>&, const std::string&, Presence);
 template void CommandLine::option(const std::string&, std::optional<double>&, const std::string&, Presence);
 template void CommandLine::values(const std::string&, int, std::vector<int>&, const std::string&, Presence);
 template void CommandLine::values(const std::string&, int, std::vector<double>&, const std::string&, Presence);

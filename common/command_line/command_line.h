@@ -28,7 +28,7 @@ class CommandLine {
 
   void flag(const std::string& names, bool& value, const std::string& help);
 
-  // T: int, std::uint64_t, double, std::string, std::filesystem::path or std::optional<double>.
+  // T: int, std::uint64_t, double, std::string, std::filesystem::path, or std::optional of int or double.
   template <typename T>
   void option(const std::string& names, T& value, const std::string& help, Presence = Presence::optional);
 

@@ -2,30 +2,29 @@
 #include "host/blending/view_weights.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace mf {
 
 std::size_t blend_weights(std::span<ViewPenalty> candidates, int k, float floor, std::span<ViewWeight> out) {
-  const std::size_t wanted = std::min({static_cast<std::size_t>(k), candidates.size(), out.size()});
+  const auto end = std::partition(candidates.begin(), candidates.end(),
+                                  [](const ViewPenalty& c) { return std::isfinite(c.penalty); });
+  const auto speaking = static_cast<std::size_t>(end - candidates.begin());
+  const std::size_t wanted = std::min({static_cast<std::size_t>(k), speaking, out.size()});
   if (wanted == 0) return 0;
-  const auto better = [](const ViewPenalty& a, const ViewPenalty& b) { return a.penalty < b.penalty; };
-  float threshold = 0;
-  if (candidates.size() > wanted) {
-    std::nth_element(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(wanted), candidates.end(),
-                     better);
+  float threshold = std::numeric_limits<float>::infinity();
+  if (speaking > wanted) {
+    std::nth_element(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(wanted), end,
+                     [](const ViewPenalty& a, const ViewPenalty& b) { return a.penalty < b.penalty; });
     threshold = candidates[wanted].penalty;
-  } else {
-    threshold = 1.1F * std::max_element(candidates.begin(), candidates.end(), better)->penalty;
   }
-  threshold += floor;
   float sum = 0;
   for (std::size_t i = 0; i < wanted; ++i) {
-    const float penalty = candidates[i].penalty + floor;
-    out[i] = {candidates[i].view, std::max(0.0F, 1 - penalty / (threshold + 1e-3F * floor)) / penalty};
+    out[i] = {candidates[i].view, ray_weight(candidates[i].penalty, threshold, floor)};
     sum += out[i].weight;
   }
-  for (std::size_t i = 0; i < wanted; ++i)
-    out[i].weight = sum > 0 ? out[i].weight / sum : 1.0F / static_cast<float>(wanted);
+  for (std::size_t i = 0; i < wanted; ++i) out[i].weight /= sum;
   return wanted;
 }
 

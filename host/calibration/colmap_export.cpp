@@ -10,6 +10,7 @@
 #include "common/atomic_file.h"
 #include "common/demosaic.h"
 #include "common/error.h"
+#include "common/mirror_picture.h"
 #include "common/virtual_view.h"
 #include "host/io/image_file.h"
 
@@ -39,35 +40,8 @@ std::string image_line(int id, const Rigid3& view_from_world, int camera_id, con
                      q.z(), t.x(), t.y(), t.z(), camera_id, name);
 }
 
-template <typename T>
-void flip_x(Image<T>& image) {
-  for (int y = 0; y < image.height; ++y)
-    for (int x = 0; x < image.width / 2; ++x)
-      for (int c = 0; c < image.channels; ++c) std::swap(image.at(x, y, c), image.at(image.width - 1 - x, y, c));
-}
-
-// White where a pixel's centre is inside the polygon (even-odd rule).
-ImageU8 mask_of(const Polygon2& polygon, int width, int height) {
-  ImageU8 mask(width, height, 1);
-  for (int y = 0; y < height; ++y) {
-    std::vector<double> crossings;
-    for (std::size_t i = 0; i < polygon.size(); ++i) {
-      const Eigen::Vector2d& a = polygon[i];
-      const Eigen::Vector2d& b = polygon[(i + 1) % polygon.size()];
-      if ((a.y() <= y + 0.5) != (b.y() <= y + 0.5))
-        crossings.push_back(a.x() + (y + 0.5 - a.y()) / (b.y() - a.y()) * (b.x() - a.x()));
-    }
-    std::sort(crossings.begin(), crossings.end());
-    for (std::size_t i = 0; i + 1 < crossings.size(); i += 2)
-      for (int x = std::max(0, static_cast<int>(std::ceil(crossings[i] - 0.5)));
-           x < width && x + 0.5 < crossings[i + 1]; ++x)
-        mask.at(x, y) = 255;
-  }
-  return mask;
-}
-
 // One for all pictures, so that they stay comparable: what brings the middle of the lit pixels to a photographic grey.
-double display_exposure(const ImageF& picture) {
+double grey_exposure(const ImageF& picture) {
   std::vector<float> lit;
   for (const float v : picture.data)
     if (v > 0) lit.push_back(v);
@@ -99,7 +73,7 @@ class Export {
 
   void add_scene(const SessionFrame& frame) {
     const ImageF picture = read(frame);
-    if (exposure_ == 0) exposure_ = display_exposure(picture);
+    if (exposure_ == 0) exposure_ = grey_exposure(picture);
     const std::string name = "scene/" + png_name(frame.info.name);
     write_png(folder_ / "images" / name, to_srgb8(picture, exposure_));
     lines_ += image_line(++count_, calibration_.cam_from_world.value_or(Rigid3{}), direct_camera_id, name);
@@ -110,7 +84,7 @@ class Export {
         mirror_view(pose.cam_from_mirror, session_.header().target, calibration_.camera);
     if (!view) return;
     ImageF picture = read(frame);
-    if (exposure_ == 0) exposure_ = display_exposure(picture);
+    if (exposure_ == 0) exposure_ = grey_exposure(picture);
     flip_x(picture);
     ImageU8 mask = mask_of(view->opening_in_img, picture.width, picture.height);
     flip_x(mask);
@@ -148,13 +122,6 @@ class Export {
 };
 
 }  // namespace
-
-CameraModel flipped_camera(const CameraModel& camera) {
-  CameraModel flipped = camera;
-  flipped.parameters[2] = camera.width - camera.cx();
-  flipped.parameters[7] = -camera.parameters[7];
-  return flipped;
-}
 
 ColmapSummary export_colmap(const std::filesystem::path& folder, const Calibration& calibration,
                             const SessionReader& session, const ResponseCurve& response, const Progress& progress) {

@@ -19,7 +19,9 @@ void add_plate_command(CommandLine& program);
 void add_probe_command(CommandLine& program);
 void add_render_command(CommandLine& program);
 void add_composite_command(CommandLine& program);
+void add_lumigraph_command(CommandLine& program);
 void add_process_command(CommandLine& program);
+void add_view_command(CommandLine& program);
 
 // The flag that every command has: print what was measured as JSON on standard output, and nothing else there.
 void add_json_flag(CommandLine& command, bool& json);

@@ -38,11 +38,15 @@ void run(CompositeArguments& a) {
   const ImageF plate = read_plate(a.plate);
   const View view = read_view(a.cameras, a.view, std::array<int, 2>{plate.width, plate.height});
   const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
-  const LightField field = read_light_field(a.field);
-  const CompositeResult r = composite(field, mesh, plate, view, {a.options}, progress_bar());
+  StageSeconds stages;
+  const LightSource source = open_light_source("composite", a.light, a.session, stages, progress_bar());
+  const IncidentLight light = light_for(source, mesh, a.light_options, stages);
+  const auto rendering = std::chrono::steady_clock::now();
+  const CompositeResult r = composite(light, mesh, plate, view, {a.options}, progress_bar());
+  stages["rendering"] = seconds_since(rendering);
   write_pictures(a, r.picture);
   const double seconds = seconds_since(start);
-  nlohmann::json summary = rendering_summary(r.layers, seconds);
+  nlohmann::json summary = rendering_summary(r.layers, stages, seconds);
   summary["changed"] = r.changed;
   print_summary(
       a.json, summary,

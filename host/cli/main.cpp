@@ -14,6 +14,8 @@ int main(int argc, char** argv) {
   mf::add_probe_command(program);
   mf::add_render_command(program);
   mf::add_composite_command(program);
+  mf::add_lumigraph_command(program);
   mf::add_process_command(program);
+  mf::add_view_command(program);
   return program.run(argc, argv);
 }

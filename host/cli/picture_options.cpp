@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/cli/picture_options.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
@@ -11,23 +12,51 @@
 namespace mf {
 
 void add_picture_options(CommandLine& command, PictureArguments& a) {
-  command.option("field", a.field, "light field (.lf.exr)", Presence::required);
+  command.option("light", a.light,
+                 "light field (.lf.exr), or a session folder with response.json and calibration.json, from which the "
+                 "light is resampled as the picture needs it",
+                 Presence::required);
   command.option("object", a.object, "mesh to light: OBJ (world coordinates, Z-up) or glTF", Presence::required);
   command.option("--cameras", a.cameras, "views.json: camera_from_world and K of each view", Presence::required);
   command.option("--view", a.view, "which view of the cameras, from 0");
   command.option("--albedo", a.albedo, "one albedo for the whole object, 0 to 1, instead of the file's colours");
   command.option("--backend", a.backend, "gl, cpu, or auto: gl on a graphics card, else cpu");
-  command.option("--extra-directions", a.options.importance.extra_directions,
-                 "further shadow directions, spent on the brightest parts of the light");
-  command.option("--bounce-directions", a.options.bounce_directions,
-                 "directions in which light is followed off the object; 0: not at all");
-  command.option("--ground-directions", a.options.ground_directions,
-                 "directions in which the object sees the ground's light");
+  command.option("--directions", a.directions,
+                 "a preview with this many directions, the most important ones finely (default: all that there are)");
+  command.option("--extra-directions", a.extra_directions,
+                 "further shadow directions, spent on the brightest parts of the light (default: 700, in a preview at "
+                 "most --directions)");
+  command.option("--bounce-directions", a.bounce_directions,
+                 "directions in which light is followed off the object; 0: not at all (default: 500, in a preview at "
+                 "most --directions)");
+  command.option("--ground-directions", a.ground_directions,
+                 "directions in which the object sees the ground's light (default: 800, in a preview at most "
+                 "--directions)");
   command.option("--exposure", a.exposure, "for PNG: radiance is multiplied by this; 1 becomes white");
   command.repeatable("-o,--output", a.outputs, "picture to write, .exr (linear) or .png (sRGB); may be given again",
                      Presence::required);
+  command.option("--height", a.session.height_m, "session: height of the light-field plane, as for `resample`");
+  command.option("--proxy", a.session.proxy, "session: what the views are focused on, as for `resample`");
+  command.option("-k", a.session.k, "session: views blended for a ray, as for `resample`");
+  command.values("--rectangle", 4, a.rectangle, "session: x0 y0 x1 y1 of the plane's rectangle, as for `resample`");
   add_json_flag(command, a.json);
 }
+
+namespace {
+
+// What was given counts; else the usual number, of which a preview takes no more than it has directions.
+void set_directions(PictureArguments& a) {
+  constexpr int fewest = 16;  // that the ground and the bounce may have
+  const auto set = [&](int& usual, std::optional<int> given) {
+    usual = given.value_or(std::min(usual, std::max(fewest, a.directions.value_or(usual))));
+  };
+  a.light_options.directions = a.directions.value_or(0);
+  set(a.light_options.importance.extra_directions, a.extra_directions);
+  set(a.options.bounce_directions, a.bounce_directions);
+  set(a.options.ground_directions, a.ground_directions);
+}
+
+}  // namespace
 
 void check_picture_arguments(const std::string& command, PictureArguments& a) {
   for (const std::filesystem::path& output : a.outputs)
@@ -39,6 +68,10 @@ void check_picture_arguments(const std::string& command, PictureArguments& a) {
   const auto backend = parse_backend(a.backend);
   if (!backend) throw InputError(command, "--backend", "'" + a.backend + "' is none: use auto, gl or cpu");
   a.options.backend = *backend;
+  if (!a.rectangle.empty()) a.session.rectangle = {a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
+  if (a.directions && *a.directions < 1) throw InputError(command, "--directions", "must be at least 1");
+  set_directions(a);
+  if (const auto problem = a.light_options.validate()) throw InputError(command, "", *problem);
   if (const auto problem = a.options.validate()) throw InputError(command, "", *problem);
 }
 
@@ -60,9 +93,9 @@ std::string output_lines(const PictureArguments& a) {
   return lines;
 }
 
-nlohmann::json rendering_summary(const RenderResult& r, double seconds) {
-  return {{"backend", r.backend},    {"lights", r.lights},        {"points", r.fragments},
-          {"width", r.object.width}, {"height", r.object.height}, {"seconds", seconds}};
+nlohmann::json rendering_summary(const RenderResult& r, const StageSeconds& stages, double seconds) {
+  return {{"backend", r.backend},      {"lights", r.lights}, {"points", r.fragments},     {"width", r.object.width},
+          {"height", r.object.height}, {"seconds", seconds}, {"seconds_by_stage", stages}};
 }
 
 }  // namespace mf

@@ -106,25 +106,26 @@ void run(const ProcessArguments& a) {
       timed(seconds, "photometry", [&] { return estimate_response(session, a.photometry, progress); });
   const Calibration calibration =
       timed(seconds, "calibrate", [&] { return estimate_calibration(session, response, a.calibration, progress); });
-  const ResampleResult resampled = timed(
-      seconds, "resample", [&] { return run_resample(a.session, a.output / "field.lf.exr", a.resample, progress); });
-  const Eigen::Vector3d at = probe_point(resampled.field.plane);
-  const Probe probe = timed(
-      seconds, "probe", [&] { return make_probe(resampled.field, at, LatLongConvention::openexr, probe_width_px); });
+  const fs::path field_file = a.output / "field.lf.exr";
+  Team alone;
+  timed(seconds, "resample", [&] { return run_resample(a.session, field_file, a.resample, alone, progress); });
+  const LightField field = read_light_field(field_file);
+  const Eigen::Vector3d at = probe_point(field.plane);
+  const Probe probe =
+      timed(seconds, "probe", [&] { return make_probe(field, at, LatLongConvention::openexr, probe_width_px); });
   write_probe(a.output, probe, at);
   const std::string name = fs::absolute(a.session).lexically_normal().filename().string();
-  write_file_atomically(a.output / "report.html",
-                        report_html({"Mirrorfield report: " + name, session, response, calibration, resampled.field,
-                                     probe.radiance, at, seconds},
-                                    progress));
+  write_file_atomically(a.output / "report.html", report_html({"Mirrorfield report: " + name, session, response,
+                                                               calibration, field, probe.radiance, at, seconds},
+                                                              progress));
   const std::size_t used = used_frames(calibration);
-  const double covered = covered_share(resampled.field);
+  const double covered = covered_share(field);
   print_summary(a.json,
                 {{"frames", calibration.frames.size()},
                  {"used", used},
                  {"rms_px", calibration.rms_px},
-                 {"directions", resampled.field.directions.size()},
-                 {"size", resampled.field.resolution},
+                 {"directions", field.directions.size()},
+                 {"size", field.resolution},
                  {"covered_share", covered},
                  {"absolute", response.absolute},
                  {"seconds", seconds},

@@ -47,15 +47,20 @@ void run(RenderArguments& a) {
   }
   const View view = read_view(a.cameras, a.view, size);
   const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
-  const LightField field = read_light_field(a.field);
-  RenderInput input{field, mesh, view, std::nullopt};
-  if (a.ground_albedo) input.ground = diffuse_ground(field, mesh, *a.ground_albedo);
+  StageSeconds stages;
+  const LightSource source = open_light_source("render", a.light, a.session, stages, progress_bar());
+  a.light_options.plane = a.ground_albedo.has_value();
+  const IncidentLight light = light_for(source, mesh, a.light_options, stages);
+  const auto rendering = std::chrono::steady_clock::now();
+  RenderInput input{light, mesh, view, std::nullopt};
+  if (a.ground_albedo) input.ground = diffuse_ground(light, mesh, *a.ground_albedo);
   const RenderResult r = render(input, a.options, progress_bar());
+  stages["rendering"] = seconds_since(rendering);
   ImageF picture = r.object;
   if (a.ground_albedo) add_ground(picture, r, *a.ground_albedo);
   write_pictures(a, picture);
   const double seconds = seconds_since(start);
-  print_summary(a.json, rendering_summary(r, seconds),
+  print_summary(a.json, rendering_summary(r, stages, seconds),
                 fmt::format("{} × {}, {} triangles, {} directions on {}, {:.1f} s\n{}", view.camera.width,
                             view.camera.height, mesh.triangles.size(), r.lights, r.backend, seconds, output_lines(a)));
 }

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "common/error.h"
-#include "common/response_curve.h"
-#include "common/session.h"
 #include "host/cli/command.h"
+#include "host/cli/peak_memory.h"
 #include "host/cli/run_resample.h"
-#include "host/cli/session_files.h"
+#include "host/cli/session_views.h"
 
 namespace mf {
 
@@ -21,6 +20,7 @@ struct ResampleArguments {
   std::filesystem::path output;
   ResampleOptions options;
   std::vector<double> rectangle;
+  int threads = 0;
   bool json = false;
 };
 
@@ -38,13 +38,21 @@ nlohmann::json summarize(const ResampleResult& r) {
           {"rectangle_m", {plane.min_m.x(), plane.min_m.y(), plane.max_m.x(), plane.max_m.y()}},
           {"height_m", plane.world_from_plane.translation.z()},
           {"mean_confidence", r.mean_confidence},
-          {"seconds", r.seconds}};
+          {"seconds", r.seconds},
+          {"peak_memory_bytes", peak_memory_bytes()}};
 }
 
 void run(ResampleArguments& a) {
+  if (a.threads < 0)
+    throw InputError("resample", "--threads", "must be a number of threads (0: as many as processors)");
   if (!a.rectangle.empty())
     a.options.rectangle = std::array<double, 4>{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
-  const ResampleResult r = run_resample(a.session, a.output, a.options, progress_bar());
+  std::optional<tbb::global_control> limit;
+  if (a.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(a.threads));
+  Team team = Team::join();
+  const ResampleResult r =
+      run_resample(a.session, a.output, a.options, team, team.rank() == 0 ? progress_bar() : Progress());
+  if (team.rank() > 0) return;
   const Eigen::Vector2d size = r.field.plane.size_m();
   print_summary(
       a.json, summarize(r),
@@ -57,32 +65,14 @@ void run(ResampleArguments& a) {
 }  // namespace
 
 ResampleResult run_resample(const std::filesystem::path& folder, const std::filesystem::path& output,
-                            const ResampleOptions& options, const Progress& progress) {
-  if (const auto problem = options.validate())
-    throw InputError("resample", "--" + problem->substr(0, problem->find(':')),
-                     problem->substr(problem->find(':') + 2));
-  auto start = std::chrono::steady_clock::now();
-  const SessionReader session(folder);
-  const ResponseCurve response = response_of(session);
-  const Calibration calibration = calibration_of(session);
-  std::optional<PlaneRectangle> rectangle;
-  if (options.rectangle) {
-    const auto& r = *options.rectangle;
-    rectangle = PlaneRectangle{{Eigen::Quaterniond::Identity(), {0, 0, options.height_m}}, {r[0], r[1]}, {r[2], r[3]}};
-  } else {
-    rectangle = covered_rectangle(calibration, session.header().target, options.height_m);
-  }
-  if (!rectangle)
-    throw InputError((folder / "calibration.json").string(), "frames",
-                     "no mirror view looks through the plane at this --height: lower it, or give --rectangle");
-  const std::vector<FieldView> views = load_field_views(session, response, calibration, {}, progress);
+                            const ResampleOptions& options, Team& team, const Progress& progress) {
+  const auto start = std::chrono::steady_clock::now();
+  const SessionViews session = load_session_views("resample", folder, options, team, progress);
   const double loading = seconds_since(start);
-  ResampleResult result = resample(views, *rectangle, options, progress);
-  result.field.absolute = response.absolute;
+  Resampling resampling(session.views, session.rectangle, options, team, progress);
+  ResampleResult result = resample_to_file(resampling, output, session.absolute, team, progress);
   result.seconds["loading"] = loading;
-  start = std::chrono::steady_clock::now();
-  write_light_field(output, result.field);
-  result.seconds["writing"] = seconds_since(start);
+  result.seconds["total"] = seconds_since(start);
   return result;
 }
 
@@ -101,6 +91,7 @@ void add_resample_command(CommandLine& program) {
   command.option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)");
   command.values("--rectangle", 4, a->rectangle,
                  "x0 y0 x1 y1 of the plane's rectangle, world metres (default: where the mirror swept)");
+  command.option("--threads", a->threads, "threads of this process (0: as many as processors)");
   add_json_flag(command, a->json);
   command.on_run([a] { run(*a); });
 }

@@ -8,8 +8,9 @@
 
 namespace mf {
 
-// Session folder (with response.json and calibration.json) → light field file. Throws InputError.
+// Session folder (with response.json and calibration.json) → light field file; the result's field has no texels. Throws
+// InputError.
 [[nodiscard]] ResampleResult run_resample(const std::filesystem::path& session, const std::filesystem::path& output,
-                                          const ResampleOptions&, const Progress&);
+                                          const ResampleOptions&, Team&, const Progress&);
 
 }  // namespace mf

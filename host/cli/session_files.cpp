@@ -27,8 +27,11 @@ SessionReader open_session(const std::filesystem::path& folder) {
 ResponseCurve response_of(const SessionReader& session) {
   const std::filesystem::path file = session.folder() / "response.json";
   if (std::filesystem::exists(file)) return read_response_curve(file);
-  if (!session.header().format.linear_float) refuse(session, file, "photometry");
-  return {};
+  const PixelFormat& format = session.header().format;
+  if (!format.linear_float) refuse(session, file, "photometry");
+  ResponseCurve proportional;
+  proportional.radiance_scale.assign(static_cast<std::size_t>(format.colour_channels()), 1);
+  return proportional;
 }
 
 Calibration calibration_of(const SessionReader& session) {

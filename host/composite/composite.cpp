@@ -104,14 +104,14 @@ GroundRadiance plate_on_ground(const ImageF& plate, const View& view, const Plan
   return ground;
 }
 
-CompositeResult composite(const LightField& field, const TriangleMesh& mesh_in_world, const ImageF& plate,
+CompositeResult composite(const IncidentLight& light, const TriangleMesh& mesh_in_world, const ImageF& plate,
                           const View& view, const CompositeOptions& options, const Progress& progress) {
   check(!options.validate(), "valid composite options");
   check(plate.channels == 3 && plate.width == view.camera.width && plate.height == view.camera.height,
         "a plate of three channels and the view's size");
-  const TriangleMesh mesh = transformed(field.plane.world_from_plane.inverse(), mesh_in_world);
+  const TriangleMesh mesh = transformed(light.plane.world_from_plane.inverse(), mesh_in_world);
   CompositeResult result;
-  result.layers = render({field, mesh_in_world, view, plate_on_ground(plate, view, field.plane, bounds_of(mesh))},
+  result.layers = render({light, mesh_in_world, view, plate_on_ground(plate, view, light.plane, bounds_of(mesh))},
                          options.render, progress);
   const RenderResult& layers = result.layers;
   result.picture = ImageF(plate.width, plate.height, 3);

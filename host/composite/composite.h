@@ -22,10 +22,10 @@ struct CompositeResult {
 //   picture = object + (1 − coverage) · plate · E_with / E_without
 //
 // The plate is linear and its camera known; the receiving plane is the light field's (the table). Its irradiance with
-// and without the object comes from the light field, so their ratio holds shadows and reflected light, and the plate
+// and without the object comes from the captured light, so their ratio holds shadows and reflected light, and the plate
 // keeps its own texture. The light that the plane sends up onto the object is the plate itself, seen on the plane.
-// Precondition: three channels, the view's size, every value finite.
-[[nodiscard]] CompositeResult composite(const LightField&, const TriangleMesh& mesh_in_world, const ImageF& plate,
+// Preconditions: the light was asked for with the plane; three channels, the view's size, every value finite.
+[[nodiscard]] CompositeResult composite(const IncidentLight&, const TriangleMesh& mesh_in_world, const ImageF& plate,
                                         const View&, const CompositeOptions&, const Progress& = {});
 
 // The plate as the radiance of the plane around the object. Where the camera doesn't see the plane, the radiance is

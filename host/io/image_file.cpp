@@ -65,4 +65,16 @@ ImageU8 to_srgb8(const ImageF& linear, double exposure) {
   return encoded;
 }
 
+double display_exposure(const ImageF& linear) {
+  std::vector<float> lit;
+  for (std::size_t i = 0; i + 2 < linear.data.size(); i += 3) {
+    const float brightest = std::max({linear.data[i], linear.data[i + 1], linear.data[i + 2]});
+    if (brightest > 0) lit.push_back(brightest);
+  }
+  if (lit.empty()) return 1;
+  const auto at = lit.begin() + static_cast<std::ptrdiff_t>(0.97 * static_cast<double>(lit.size() - 1));
+  std::nth_element(lit.begin(), at, lit.end());
+  return 0.9 / static_cast<double>(*at);
+}
+
 }  // namespace mf

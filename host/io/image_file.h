@@ -21,4 +21,7 @@ void write_png(const std::filesystem::path&, const ImageU8&);
 // Linear radiance → 8-bit sRGB after multiplying by `exposure` (1: radiance 1 becomes white).
 [[nodiscard]] ImageU8 to_srgb8(const ImageF& linear, double exposure);
 
+// Exposure for to_srgb8() under which all but the brightest 3 % of the lit pixels keep their colour. RGB.
+[[nodiscard]] double display_exposure(const ImageF& linear);
+
 }  // namespace mf

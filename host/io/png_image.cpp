@@ -143,6 +143,26 @@ StoredImage decode_png(std::string_view bytes, const std::string& file) {
   return {std::move(image), bits};
 }
 
+std::optional<ImageU8> decode_png_alpha(std::string_view bytes, const std::string& file) {
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  const auto refuse = [&] {
+    throw InputError(file, "", fmt::format("is truncated or damaged ({}): copy or record it again", png.message));
+  };
+  if (png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()) == 0) refuse();
+  const bool too_large = png.width > max_side || png.height > max_side;
+  if (too_large || (png.format & PNG_FORMAT_FLAG_ALPHA) == 0) {
+    png_image_free(&png);
+    return std::nullopt;  // decode_png refuses what is too large
+  }
+  png.format = PNG_FORMAT_GA;
+  std::vector<png_byte> grey_and_alpha(PNG_IMAGE_SIZE(png));
+  if (png_image_finish_read(&png, nullptr, grey_and_alpha.data(), 0, nullptr) == 0) refuse();
+  ImageU8 alpha(static_cast<int>(png.width), static_cast<int>(png.height), 1);
+  for (std::size_t i = 0; i < alpha.data.size(); ++i) alpha.data[i] = grey_and_alpha[2 * i + 1];
+  return alpha;
+}
+
 namespace {
 
 void append_bytes(png_structp png, png_bytep bytes, std::size_t count) {

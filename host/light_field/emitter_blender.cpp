@@ -72,17 +72,21 @@ Eigen::Vector3f unhidden_radiance(const std::vector<FieldView>& views, const Emi
 }  // namespace
 
 EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
-                               std::span<const Emitter> emitters, const PlaneRectangle& rectangle)
+                               std::span<const Emitter> emitters, const PlaneRectangle& rectangle, const Team& team)
     : views_(views), surroundings_(surroundings) {
   for (const Emitter& emitter : emitters) {
     ShadedEmitter shaded;
     shaded.emitter = emitter;
     shaded.radiance = unhidden_radiance(views, emitter);
     shaded.plane_height_m = static_cast<float>(rectangle.world_from_plane.translation.z());
-    draw_occluders(views, rectangle, shaded);
+    draw_occluders(views, rectangle, team, shaded);
     emitters_.push_back(std::move(shaded));
   }
 }
+
+EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
+                               std::vector<ShadedEmitter> emitters)
+    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)) {}
 
 bool EmitterBlender::concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
   return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {

@@ -9,6 +9,7 @@
 #include "host/light_field/emitters.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -27,7 +28,9 @@ class EmitterBlender {
   // Finds each emitter's occluder by photo-consistency over its distance, and draws its mask over the rectangle. Keeps
   // references to views and surroundings.
   EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::span<const Emitter>,
-                 const PlaneRectangle&);
+                 const PlaneRectangle&, const Team&);
+  // With masks that are drawn already.
+  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>);
 
   // Whether rays within `angle_rad` of the direction may see an emitter or a ghost of one.
   [[nodiscard]] bool concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;

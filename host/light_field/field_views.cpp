@@ -3,7 +3,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -12,16 +11,97 @@
 #include "common/demosaic.h"
 #include "common/error.h"
 #include "common/virtual_view.h"
+#include "host/light_field/binned_radiance.h"
 
 namespace mf {
 
+// ---- levels ----
+
+void PremultipliedImage::set(int x, int y, const Eigen::Vector4f& texel) {
+  const float scale = 1 / unit_;
+  texels_[index(x, y)] = Texel{to_normal_half(texel.x() * scale), to_normal_half(texel.y() * scale),
+                               to_normal_half(texel.z() * scale), to_normal_half(texel.w())};
+}
+
 namespace {
 
-// A rectangle of level-0 pixels.
-struct PixelBox {
-  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-  [[nodiscard]] bool empty() const { return x1 <= x0 || y1 <= y0; }
+// Texels by rows, as floats: levels are made from each other before they are rounded.
+struct FloatTexels {
+  int width = 0;
+  int height = 0;
+  std::vector<Eigen::Vector4f> texels;
 };
+
+void encode(std::span<const Eigen::Vector4f> texels, PremultipliedImage& image) {
+  for (int y = 0; y < image.height(); ++y)
+    for (int x = 0; x < image.width(); ++x)
+      image.set(
+          x, y,
+          texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width()) + static_cast<std::size_t>(x)]);
+}
+
+void half_size(std::span<const Eigen::Vector4f> in, int width, int height, FloatTexels& out) {
+  out.width = (width + 1) / 2;
+  out.height = (height + 1) / 2;
+  out.texels.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+  for (int y = 0; y < out.height; ++y)
+    for (int x = 0; x < out.width; ++x) {
+      const bool right = 2 * x + 1 < width, below = 2 * y + 1 < height;  // beyond the edge nothing was seen
+      const Eigen::Vector4f* at =
+          &in[static_cast<std::size_t>(2 * y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(2 * x)];
+      Eigen::Vector4f sum = at[0];
+      if (right) sum += at[1];
+      if (below) sum += at[width];
+      if (right && below) sum += at[width + 1];
+      out.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(out.width) + static_cast<std::size_t>(x)] =
+          0.25F * sum;
+    }
+}
+
+// The power of two in which the brightest texel is just below half the largest half float.
+float unit_for(std::span<const Eigen::Vector4f> texels) {
+  Eigen::Vector4f most = Eigen::Vector4f::Zero();
+  for (const Eigen::Vector4f& t : texels) most = most.cwiseMax(t);
+  const float brightest = most.head<3>().maxCoeff();
+  if (!(brightest > 0) || !std::isfinite(brightest)) return 1;
+  constexpr int target_exponent = 14;
+  return std::ldexp(1.0F, std::clamp(std::ilogb(brightest) - target_exponent, -120, 120));
+}
+
+}  // namespace
+
+namespace {
+
+std::vector<PremultipliedImage> empty_levels(int width, int height, float unit) {
+  std::vector<PremultipliedImage> levels;
+  levels.emplace_back(width, height, unit);
+  while (width > 2 || height > 2) {
+    width = (width + 1) / 2;
+    height = (height + 1) / 2;
+    levels.emplace_back(width, height, unit);
+  }
+  return levels;
+}
+
+}  // namespace
+
+std::vector<PremultipliedImage> make_levels(int width, int height, std::span<const Eigen::Vector4f> texels) {
+  std::vector<PremultipliedImage> levels = empty_levels(width, height, unit_for(texels));
+  encode(texels, levels.front());
+  FloatTexels level, next;
+  std::span<const Eigen::Vector4f> finer = texels;
+  for (std::size_t i = 1; i < levels.size(); ++i) {
+    half_size(finer, levels[i - 1].width(), levels[i - 1].height(), next);
+    std::swap(level, next);
+    finer = level.texels;
+    encode(finer, levels[i]);
+  }
+  return levels;
+}
+
+// ---- one frame ----
+
+namespace {
 
 PixelBox opening_box(const Polygon2& opening, double scale, int width, int height) {
   if (opening.empty()) return {};
@@ -36,94 +116,121 @@ PixelBox opening_box(const Polygon2& opening, double scale, int width, int heigh
           std::min(height, static_cast<int>(std::ceil(high.y() * scale)))};
 }
 
-double smooth_step(double x) {
-  const double t = std::clamp(x, 0.0, 1.0);
-  return t * t * (3 - 2 * t);
+// Where each level-0 pixel of an ideal pinhole lies in the picture as taken, camera pixels. The same for every frame.
+struct TakenPositions {
+  int width = 0;  // level-0 pixels
+  int height = 0;
+  std::vector<float> u, v;
+
+  TakenPositions(const CameraModel& camera, double scale)
+      : width(static_cast<int>(camera.width * scale)), height(static_cast<int>(camera.height * scale)) {
+    u.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    v.resize(u.size());
+    tbb::parallel_for(0, height, [&](int y) {
+      for (int x = 0; x < width; ++x) {
+        const Eigen::Vector2d ideal((x + 0.5) / scale, (y + 0.5) / scale);
+        const Eigen::Vector3d ray((ideal.x() - camera.cx()) / camera.fx(), (ideal.y() - camera.cy()) / camera.fy(), 1);
+        const Eigen::Vector2d taken = camera.has_distortion() ? camera.project(ray) : ideal;
+        u[index(x, y)] = static_cast<float>(taken.x());
+        v[index(x, y)] = static_cast<float>(taken.y());
+      }
+    });
+  }
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+  }
+};
+
+// What every frame shares.
+struct Loader {
+  const SessionReader& session;
+  const ResponseCurve& response;
+  const Calibration& calibration;
+  const FieldViewOptions& options;
+  double scale;
+  TakenPositions taken;
+};
+
+// The part of the taken picture that a box of ideal pixels needs, level-0 pixels.
+PixelBox taken_box(const Loader& l, const PixelBox& box) {
+  float u0 = INFINITY, v0 = INFINITY, u1 = -INFINITY, v1 = -INFINITY;
+  const auto include = [&](int x, int y) {
+    const std::size_t i = l.taken.index(x, y);
+    u0 = std::min(u0, l.taken.u[i]);
+    u1 = std::max(u1, l.taken.u[i]);
+    v0 = std::min(v0, l.taken.v[i]);
+    v1 = std::max(v1, l.taken.v[i]);
+  };
+  for (int x = box.x0; x < box.x1; ++x)
+    for (const int y : {box.y0, box.y1 - 1}) include(x, y);
+  for (int y = box.y0; y < box.y1; ++y)
+    for (const int x : {box.x0, box.x1 - 1}) include(x, y);
+  const float s = static_cast<float>(l.scale);
+  constexpr int margin = 2;  // an interpolation's neighbours, and edges that bulge between two pixels
+  const auto column = [&](float u, int more) {
+    return std::clamp(static_cast<int>(std::floor(u * s)) + more, 0, l.taken.width);
+  };
+  const auto row = [&](float v, int more) {
+    return std::clamp(static_cast<int>(std::floor(v * s)) + more, 0, l.taken.height);
+  };
+  return {column(u0, -margin), row(v0, -margin), column(u1, margin + 1), row(v1, margin + 1)};
 }
 
-// The mirror's surface as seen by an ideal pinhole: ray (x, y, 1) in the camera → (x·w, y·w, w) on the mirror, metres.
-Eigen::Matrix3d mirror_from_ray(const Rigid3& cam_from_mirror) {
-  const Eigen::Matrix3d r = cam_from_mirror.rotation.toRotationMatrix();
-  Eigen::Matrix3d cam_from_surface;
-  cam_from_surface << r.col(0), r.col(1), cam_from_mirror.translation;
-  return cam_from_surface.inverse();
+// Radiance of the taken picture in a box of level-0 pixels. Frames are decoded only where needed.
+ImageF radiance_in(const Loader& l, const SessionFrame& frame, const PixelBox& box) {
+  const PixelFormat& format = l.session.header().format;
+  if (!l.options.full_resolution)
+    return binned_radiance(l.session.read_frame(frame, {2 * box.y0, 2 * box.y1}), format, l.response, box);
+  const ImageF all = demosaic(linearize(l.session.read_frame(frame), format, l.response), format.layout);
+  ImageF out(box.width(), box.height(), all.channels);
+  for (int y = 0; y < out.height; ++y)
+    std::copy_n(&all.data[all.index(box.x0, box.y0 + y)], out.row(y).size(), out.row(y).data());
+  return out;
 }
 
-Eigen::Vector3f bilinear_rgb(const ImageF& image, double u, double v) {
-  const double x = std::clamp(u - 0.5, 0.0, image.width - 1.0), y = std::clamp(v - 0.5, 0.0, image.height - 1.0);
+// Bilinear; texel centres at +0.5; the edge's colour beyond it.
+Eigen::Vector3f bilinear_rgb(const ImageF& image, float u, float v) {
+  const float x = std::clamp(u - 0.5F, 0.0F, static_cast<float>(image.width - 1));
+  const float y = std::clamp(v - 0.5F, 0.0F, static_cast<float>(image.height - 1));
   const int x0 = std::min(static_cast<int>(x), std::max(image.width - 2, 0));
   const int y0 = std::min(static_cast<int>(y), std::max(image.height - 2, 0));
   const int x1 = std::min(x0 + 1, image.width - 1), y1 = std::min(y0 + 1, image.height - 1);
-  const float fx = static_cast<float>(x - x0), fy = static_cast<float>(y - y0);
-  Eigen::Vector3f out;
-  for (int c = 0; c < 3; ++c) {
-    const int channel = image.channels == 1 ? 0 : c;
-    const float top = image.at(x0, y0, channel) * (1 - fx) + image.at(x1, y0, channel) * fx;
-    const float bottom = image.at(x0, y1, channel) * (1 - fx) + image.at(x1, y1, channel) * fx;
-    out[c] = top * (1 - fy) + bottom * fy;
-  }
-  return out;
+  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
+  const auto pixel = [&](int at_x, int at_y) -> Eigen::Vector3f {
+    const float* p = &image.data[image.index(at_x, at_y)];
+    return image.channels == 1 ? Eigen::Vector3f::Constant(p[0]) : Eigen::Vector3f(p[0], p[1], p[2]);
+  };
+  return (pixel(x0, y0) * (1 - fx) + pixel(x1, y0) * fx) * (1 - fy) +
+         (pixel(x0, y1) * (1 - fx) + pixel(x1, y1) * fx) * fy;
 }
 
-struct ViewGeometry {
-  const CameraModel* camera;
-  const MirrorTarget* target;
-  Eigen::Matrix3d mirror_from_ray;
-  double scale;  // level-0 pixels per camera pixel
-};
-
-// Buehler's field-of-view weight at a camera pixel whose ideal ray is given.
-double view_weight(const ViewGeometry& g, const FieldViewOptions& options, const Eigen::Vector3d& ray,
-                   const Eigen::Vector2d& pixel) {
-  const Eigen::Vector3d h = g.mirror_from_ray * ray;
-  if (h.z() <= 0) return 0;
-  const Eigen::Vector2d inside = 0.5 * g.target->opening_m - h.hnormalized().cwiseAbs();  // to the edges, metres
-  const double border = options.border_fraction * g.target->opening_m.minCoeff();
-  // Metres on the mirror per pixel, from the change of the surface point along one pixel step in each direction.
-  const double px = 1.0 / g.camera->fx();
-  const Eigen::Vector2d step = (g.mirror_from_ray * (ray + Eigen::Vector3d(px, 0, 0))).hnormalized() - h.hnormalized();
-  const Eigen::Vector2d step_y =
-      (g.mirror_from_ray * (ray + Eigen::Vector3d(0, px, 0))).hnormalized() - h.hnormalized();
-  const Eigen::Vector2d per_px = step.cwiseAbs() + step_y.cwiseAbs();
-  const Eigen::Vector2d clear = inside - options.inset_px * per_px;
-  if (clear.minCoeff() <= 0) return 0;
-  const double mirror_edge = border > 0 ? smooth_step(clear.minCoeff() / border) : 1.0;
-  const double picture_edge =
-      std::min({pixel.x(), pixel.y(), g.camera->width - pixel.x(), g.camera->height - pixel.y()});
-  constexpr double picture_border_px = 12;  // a frame that cuts the mirror fades out as softly as the mirror's edge
-  return mirror_edge * smooth_step((picture_edge - options.inset_px) / picture_border_px);
-}
-
-PremultipliedImage crop_opening(const ImageF& radiance, const PixelBox& box, const ViewGeometry& g,
-                                const FieldViewOptions& options, float gain) {
-  PremultipliedImage out(box.x1 - box.x0, box.y1 - box.y0);
-  const bool straight = !g.camera->has_distortion();
-  for (int y = 0; y < out.height(); ++y)
-    for (int x = 0; x < out.width(); ++x) {
-      const Eigen::Vector2d ideal((box.x0 + x + 0.5) / g.scale, (box.y0 + y + 0.5) / g.scale);
-      const Eigen::Vector3d ray((ideal.x() - g.camera->cx()) / g.camera->fx(),
-                                (ideal.y() - g.camera->cy()) / g.camera->fy(), 1);
-      const Eigen::Vector2d pixel = straight ? ideal : g.camera->project(ray);
-      const float a = static_cast<float>(view_weight(g, options, ray, pixel));
-      if (a <= 0) continue;
-      Eigen::Vector3f colour;
-      if (straight)
-        for (int c = 0; c < 3; ++c) colour[c] = radiance.at(box.x0 + x, box.y0 + y, radiance.channels == 1 ? 0 : c);
-      else
-        colour = bilinear_rgb(radiance, pixel.x() * g.scale, pixel.y() * g.scale);
-      out.at(x, y) << colour * (gain * a), a;
+std::vector<PremultipliedImage> levels_of(const Loader& l, const SessionFrame& frame, const MirrorPose& pose,
+                                          const PixelBox& box) {
+  const PixelBox source = taken_box(l, box);
+  const ImageF radiance = radiance_in(l, frame, source);
+  const ViewBorder border(l.calibration.camera, l.session.header().target, pose.cam_from_mirror, l.options.border,
+                          l.scale);
+  const float gain = static_cast<float>(1 / l.session.header().mirror_reflectance);
+  const float scale = static_cast<float>(l.scale);
+  const std::size_t width = static_cast<std::size_t>(box.width());
+  std::vector<float> weights(width);
+  std::vector<Eigen::Vector4f> texels;
+  texels.reserve(width * static_cast<std::size_t>(box.height()));
+  for (int y = box.y0; y < box.y1; ++y) {
+    const std::size_t first = l.taken.index(box.x0, y);
+    const std::span<const float> u(&l.taken.u[first], width), v(&l.taken.v[first], width);
+    border.weigh_row(box.x0, y, u, v, weights);
+    for (std::size_t x = 0; x < width; ++x) {
+      Eigen::Vector4f texel = Eigen::Vector4f::Zero();
+      if (weights[x] > 0)
+        texel << gain * weights[x] *
+                     bilinear_rgb(radiance, u[x] * scale - static_cast<float>(source.x0),
+                                  v[x] * scale - static_cast<float>(source.y0)),
+            weights[x];
+      texels.push_back(texel);
     }
-  return out;
-}
-
-PremultipliedImage half_size(const PremultipliedImage& in) {
-  PremultipliedImage out((in.width() + 1) / 2, (in.height() + 1) / 2);
-  // An odd size reads the empty rim: beyond the edge nothing was seen.
-  for (int y = 0; y < out.height(); ++y)
-    for (int x = 0; x < out.width(); ++x)
-      out.at(x, y) = 0.25F * (in.at(2 * x, 2 * y) + in.at(2 * x + 1, 2 * y) + in.at(2 * x, 2 * y + 1) +
-                              in.at(2 * x + 1, 2 * y + 1));
-  return out;
+  }
+  return make_levels(box.width(), box.height(), texels);
 }
 
 // Everything of a view but its pixels.
@@ -141,11 +248,19 @@ void set_geometry(FieldView& view, const Calibration& calibration, const PixelBo
   view.focal_px = static_cast<float>(0.5 * (camera.fx() + camera.fy()) * scale);
 }
 
+void share_levels(const Team& team, std::size_t from, const PixelBox& box, std::vector<PremultipliedImage>& levels) {
+  if (team.size() == 1) return;
+  float unit = levels.empty() ? 0 : levels.front().unit();
+  team.share(std::as_writable_bytes(std::span(&unit, 1)), from);
+  if (levels.empty()) levels = empty_levels(box.width(), box.height(), unit);
+  for (PremultipliedImage& level : levels) team.share(std::as_writable_bytes(level.texels()), from);
+}
+
 }  // namespace
 
 std::vector<FieldView> load_field_views(const SessionReader& session, const ResponseCurve& response,
-                                        const Calibration& calibration, const FieldViewOptions& options,
-                                        const Progress& progress) {
+                                        const Calibration& calibration, const Team& team, const Progress& progress,
+                                        const FieldViewOptions& options) {
   const std::string source = (session.folder() / "calibration.json").string();
   if (!calibration.cam_from_world)
     throw InputError(source, "cam_from_world",
@@ -153,38 +268,30 @@ std::vector<FieldView> load_field_views(const SessionReader& session, const Resp
   const std::vector<SessionFrame> frames = session.frames(FrameRole::mirror);
   if (frames.size() != calibration.frames.size())
     throw InputError(source, "frames", "does not match the session's frames: calibrate again");
-  const PixelFormat& format = session.header().format;
   // Binning a mosaic's cells needs no demosaicing; other formats bin as well, for the same scale everywhere.
   const double scale = options.full_resolution ? 1.0 : 0.5;
-  const float gain = static_cast<float>(1 / session.header().mirror_reflectance);
-
+  const Loader loader{session, response, calibration, options, scale, TakenPositions(calibration.camera, scale)};
   std::vector<FieldView> loaded(frames.size());
+  std::vector<PixelBox> boxes(frames.size());
   std::atomic<std::size_t> done = 0;
   std::mutex reporting;
   tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t i) {
     const MirrorPose& pose = calibration.frames[i];
     const auto virtual_view =
         pose.used ? mirror_view(pose.cam_from_mirror, session.header().target, calibration.camera) : std::nullopt;
-    const int width = static_cast<int>(calibration.camera.width * scale),
-              height = static_cast<int>(calibration.camera.height * scale);
-    const PixelBox box = virtual_view ? opening_box(virtual_view->opening_in_img, scale, width, height) : PixelBox{};
-    if (!box.empty()) {
-      const ImageF linear = linearize(session.read_frame(frames[i]), format, response);
-      const ImageF radiance =
-          options.full_resolution ? demosaic(linear, format.layout) : bin_cells(linear, format.layout);
-      FieldView& view = loaded[i];
-      view.frame = i;
-      set_geometry(view, calibration, box, *virtual_view, scale);
-      const ViewGeometry geometry{&calibration.camera, &session.header().target, mirror_from_ray(pose.cam_from_mirror),
-                                  scale};
-      view.levels.push_back(crop_opening(radiance, box, geometry, options, gain));
-      while (view.levels.back().width() > 2 || view.levels.back().height() > 2)
-        view.levels.push_back(half_size(view.levels.back()));
+    if (virtual_view)
+      boxes[i] = opening_box(virtual_view->opening_in_img, scale, loader.taken.width, loader.taken.height);
+    if (!boxes[i].empty()) {
+      loaded[i].frame = i;
+      set_geometry(loaded[i], calibration, boxes[i], *virtual_view, scale);
+      if (team.has(i)) loaded[i].levels = levels_of(loader, frames[i], pose, boxes[i]);
     }
     const std::size_t finished = ++done;
     const std::lock_guard lock(reporting);
     report_progress(progress, "linearizing views", static_cast<double>(finished) / static_cast<double>(frames.size()));
   });
+  for (std::size_t i = 0; i < loaded.size(); ++i)
+    if (!boxes[i].empty()) share_levels(team, i % team.size(), boxes[i], loaded[i].levels);
   std::erase_if(loaded, [](const FieldView& v) { return v.levels.empty(); });
   if (loaded.empty()) throw InputError(source, "frames", "holds no usable mirror pose: look at why_not of each frame");
   return loaded;

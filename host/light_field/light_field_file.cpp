@@ -1,49 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <ImathMatrix.h>
-#include <ImathVec.h>
-#include <ImfChannelList.h>
-#include <ImfFloatAttribute.h>
-#include <ImfFloatVectorAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputPart.h>
-#include <ImfIntAttribute.h>
-#include <ImfMatrixAttribute.h>
 #include <ImfMultiPartInputFile.h>
-#include <ImfMultiPartOutputFile.h>
-#include <ImfOutputPart.h>
-#include <ImfPartType.h>
-#include <ImfStandardAttributes.h>
-#include <ImfStringAttribute.h>
 #include <ImfThreading.h>
-#include <ImfTileDescriptionAttribute.h>
 #include <ImfTiledInputPart.h>
-#include <ImfTiledOutputPart.h>
-#include <ImfVecAttribute.h>
 #include <fmt/format.h>
 #include <half.h>
 
 #include <algorithm>
-#include <cmath>
 #include <thread>
 
-#include "common/atomic_file.h"
 #include "common/error.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/light_field_header.h"
 
 namespace mf {
 
 namespace {
-
-constexpr int format_version = 1;
-constexpr std::array<const char*, 4> channel_names{"R", "G", "B", "confidence"};
-
-int atlas_columns(std::size_t directions) {
-  return static_cast<int>(std::ceil(std::sqrt(static_cast<double>(directions))));
-}
-int atlas_rows(std::size_t directions) {
-  const int columns = atlas_columns(directions);
-  return (static_cast<int>(directions) + columns - 1) / columns;
-}
 
 // One row of tiles, as half floats.
 class TileRow {
@@ -58,123 +31,20 @@ class TileRow {
     Imf::FrameBuffer buffer;
     const std::size_t pixel = 4 * sizeof(half), line = pixel * static_cast<std::size_t>(width_);
     char* base = reinterpret_cast<char*>(texels_.data()) - static_cast<std::ptrdiff_t>(line) * row * resolution_;
-    for (std::size_t c = 0; c < channel_names.size(); ++c)
-      buffer.insert(channel_names[c], Imf::Slice(Imf::HALF, base + c * sizeof(half), pixel, line));
+    for (std::size_t c = 0; c < tile_channels.size(); ++c)
+      buffer.insert(tile_channels[c], Imf::Slice(Imf::HALF, base + c * sizeof(half), pixel, line));
     return buffer;
   }
   [[nodiscard]] half* texel(int column, int x, int y) {
     return texels_.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
                                  static_cast<std::size_t>(column * resolution_ + x));
   }
-  void clear() { std::fill(texels_.begin(), texels_.end(), half(0.0F)); }
 
  private:
   int resolution_;
   int width_;
   std::vector<half> texels_;
 };
-
-Imf::Header header_of(const LightField& field) {
-  const int columns = atlas_columns(field.directions.size());
-  Imf::Header header(columns * field.resolution, atlas_rows(field.directions.size()) * field.resolution);
-  for (const char* name : channel_names) header.channels().insert(name, Imf::Channel(Imf::HALF));
-  header.setTileDescription(
-      Imf::TileDescription(static_cast<unsigned>(field.resolution), static_cast<unsigned>(field.resolution)));
-  header.compression() = Imf::ZIP_COMPRESSION;
-  header.setName("field");
-  header.setType(Imf::TILEDIMAGE);
-  Imf::addChromaticities(header, Imf::Chromaticities());  // BT.709
-  header.insert("mfVersion", Imf::IntAttribute(format_version));
-  header.insert("mfResolution", Imf::IntAttribute(field.resolution));
-  header.insert("mfFrequency", Imf::IntAttribute(field.directions.frequency));
-  header.insert("mfAbsolute", Imf::IntAttribute(field.absolute ? 1 : 0));
-  header.insert("mfOptions", Imf::StringAttribute(field.options_json));
-  const Eigen::Matrix4d m = field.plane.world_from_plane.matrix();
-  Imath::M44d rows;
-  for (int r = 0; r < 4; ++r)
-    for (int c = 0; c < 4; ++c) rows[r][c] = m(r, c);
-  header.insert("mfWorldFromPlane", Imf::M44dAttribute(rows));
-  header.insert("mfPlaneMin", Imf::V2dAttribute({field.plane.min_m.x(), field.plane.min_m.y()}));
-  header.insert("mfPlaneMax", Imf::V2dAttribute({field.plane.max_m.x(), field.plane.max_m.y()}));
-  Imf::FloatVector directions;
-  for (const Eigen::Vector3f& d : field.directions.directions)
-    directions.insert(directions.end(), {d.x(), d.y(), d.z()});
-  header.insert("mfDirections", Imf::FloatVectorAttribute(directions));
-  header.insert("mfSolidAngles", Imf::FloatVectorAttribute(field.directions.solid_angles_sr));
-  return header;
-}
-
-template <typename Attribute>
-const typename std::remove_reference_t<decltype(std::declval<const Attribute&>().value())>& attribute(
-    const Imf::Header& header, const char* name, const std::string& file) {
-  const Attribute* found = header.findTypedAttribute<Attribute>(name);
-  if (found == nullptr)
-    throw InputError(file, name, "is missing: this is no light field written by 'mirrorfield resample'");
-  return found->value();
-}
-
-DirectionSet directions_of(const Imf::Header& header, const std::string& file) {
-  const int frequency = attribute<Imf::IntAttribute>(header, "mfFrequency", file);
-  if (frequency < 1 || frequency > 400) throw InputError(file, "mfFrequency", "is out of range: resample again");
-  DirectionSet set = geodesic_hemisphere_of_frequency(frequency);
-  const Imf::FloatVector& stored = attribute<Imf::FloatVectorAttribute>(header, "mfDirections", file);
-  bool same = stored.size() == 3 * set.size();
-  for (std::size_t i = 0; same && i < set.size(); ++i)
-    same = (Eigen::Map<const Eigen::Vector3f>(stored.data() + 3 * i) - set.directions[i]).norm() < 1e-4F;
-  if (!same) throw InputError(file, "mfDirections", "is not the geodesic set of mfFrequency: resample again");
-  return set;
-}
-
-LightField field_without_texels(const Imf::Header& header, const std::string& file) {
-  LightField field;
-  if (attribute<Imf::IntAttribute>(header, "mfVersion", file) != format_version)
-    throw InputError(file, "mfVersion", fmt::format("is not {}: resample again with this version", format_version));
-  field.resolution = attribute<Imf::IntAttribute>(header, "mfResolution", file);
-  field.absolute = attribute<Imf::IntAttribute>(header, "mfAbsolute", file) != 0;
-  field.options_json = attribute<Imf::StringAttribute>(header, "mfOptions", file);
-  const Imath::M44d& rows = attribute<Imf::M44dAttribute>(header, "mfWorldFromPlane", file);
-  Eigen::Matrix4d m;
-  for (int r = 0; r < 4; ++r)
-    for (int c = 0; c < 4; ++c) m(r, c) = rows[r][c];
-  const std::optional<Rigid3> world_from_plane = Rigid3::from_matrix(m);
-  if (!world_from_plane) throw InputError(file, "mfWorldFromPlane", "is no rigid transform: resample again");
-  field.plane.world_from_plane = *world_from_plane;
-  const Imath::V2d low = attribute<Imf::V2dAttribute>(header, "mfPlaneMin", file);
-  const Imath::V2d high = attribute<Imf::V2dAttribute>(header, "mfPlaneMax", file);
-  field.plane.min_m = {low.x, low.y};
-  field.plane.max_m = {high.x, high.y};
-  field.directions = directions_of(header, file);
-  const Imath::Box2i& window = header.dataWindow();
-  if (field.resolution < 2 || field.resolution > 1024 || !header.hasTileDescription() ||
-      header.tileDescription().xSize != static_cast<unsigned>(field.resolution) ||
-      window.max.x - window.min.x + 1 != atlas_columns(field.directions.size()) * field.resolution ||
-      window.max.y - window.min.y + 1 != atlas_rows(field.directions.size()) * field.resolution)
-    throw InputError(file, "dataWindow", "does not fit mfResolution and mfDirections: resample again");
-  return field;
-}
-
-// ---- the texels ----
-
-void write_tiles(Imf::MultiPartOutputFile& file, const LightField& field) {
-  Imf::TiledOutputPart out(file, 0);
-  const int columns = atlas_columns(field.directions.size()), n = field.resolution;
-  TileRow row(columns, n);
-  for (int r = 0; r < atlas_rows(field.directions.size()); ++r) {
-    row.clear();
-    for (int c = 0; c < columns; ++c) {
-      const std::size_t direction =
-          static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
-      if (direction >= field.directions.size()) break;
-      const Eigen::Vector4f* tile = field.tile(direction);
-      for (int y = 0; y < n; ++y)
-        for (int x = 0; x < n; ++x)
-          for (int i = 0; i < 4; ++i)
-            row.texel(c, x, y)[i] = half(std::min(tile[y * n + x][i], 65504.0F));  // largest half
-    }
-    out.setFrameBuffer(row.frame_buffer(r));
-    out.writeTiles(0, columns - 1, r, r);
-  }
-}
 
 void read_tiles(Imf::MultiPartInputFile& file, LightField& field) {
   Imf::TiledInputPart in(file, 0);
@@ -196,56 +66,9 @@ void read_tiles(Imf::MultiPartInputFile& file, LightField& field) {
   }
 }
 
-// ---- the surroundings and the emitters: one part a map ----
-
-struct NamedMap {
-  std::string name;
-  std::vector<const char*> channels;
-  const ImageF* map;
-  const ShadedEmitter* emitter = nullptr;  // whose mask it is
-};
-
-std::vector<NamedMap> maps_of(const LightField& field) {
-  const Surroundings& s = field.surroundings;
-  std::vector<NamedMap> maps;
-  if (!s.inverse_distance.empty()) maps.push_back({"inverseDistance", {"Y"}, &s.inverse_distance});
-  if (!s.confidence.empty()) maps.push_back({"distanceConfidence", {"Y"}, &s.confidence});
-  if (!s.panorama.empty()) maps.push_back({"panorama", {"R", "G", "B", "A"}, &s.panorama});
-  for (std::size_t i = 0; i < field.emitters.size(); ++i)
-    maps.push_back(
-        {fmt::format("emitter{}", i), {"visibility", "weight", "share"}, &field.emitters[i].mask, &field.emitters[i]});
-  return maps;
-}
-
-void describe(const ShadedEmitter& e, Imf::Header& header) {
-  const auto vector = [](const Eigen::Vector3f& v) { return Imf::V3fAttribute({v.x(), v.y(), v.z()}); };
-  header.insert("mfPosition", vector(e.emitter.position));
-  header.insert("mfRadiance", vector(e.radiance));
-  header.insert("mfRadius", Imf::FloatAttribute(e.emitter.radius_m));
-  header.insert("mfViews", Imf::IntAttribute(e.emitter.views));
-  header.insert("mfOccluderShare", Imf::FloatAttribute(e.occluder_share));
-  header.insert("mfPlaneHeight", Imf::FloatAttribute(e.plane_height_m));
-  header.insert("mfMaskMin", Imf::V2fAttribute({e.mask_min_m.x(), e.mask_min_m.y()}));
-  header.insert("mfMaskMax", Imf::V2fAttribute({e.mask_max_m.x(), e.mask_max_m.y()}));
-}
-
-// All parts of a file share the display window: the field's.
-Imf::Header header_of(const NamedMap& map, const Surroundings& s, const Imath::Box2i& display_window) {
-  Imf::Header header(display_window, Imath::Box2i({0, 0}, {map.map->width - 1, map.map->height - 1}));
-  header.setName(map.name);
-  header.setType(Imf::SCANLINEIMAGE);
-  header.compression() = Imf::ZIP_COMPRESSION;
-  Imf::addChromaticities(header, Imf::Chromaticities());
-  for (const char* channel : map.channels) header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
-  header.insert("mfCentre", Imf::V3fAttribute({s.centre_in_world.x(), s.centre_in_world.y(), s.centre_in_world.z()}));
-  if (map.emitter != nullptr) describe(*map.emitter, header);
-  return header;
-}
-
-Imf::FrameBuffer frame_buffer(const std::vector<const char*>& channels, const ImageF& map) {
+Imf::FrameBuffer float_buffer(const std::vector<const char*>& channels, ImageF& map) {
   Imf::FrameBuffer buffer;
-  // OpenEXR writes through the same type that it reads into: the pixels are not changed on writing.
-  char* base = const_cast<char*>(reinterpret_cast<const char*>(map.data.data()));
+  char* base = reinterpret_cast<char*>(map.data.data());
   const std::size_t pixel = sizeof(float) * channels.size();
   for (std::size_t c = 0; c < channels.size(); ++c)
     buffer.insert(channels[c],
@@ -253,52 +76,25 @@ Imf::FrameBuffer frame_buffer(const std::vector<const char*>& channels, const Im
   return buffer;
 }
 
-void write_map(Imf::MultiPartOutputFile& file, int part, const NamedMap& map) {
-  Imf::OutputPart out(file, part);
-  out.setFrameBuffer(frame_buffer(map.channels, *map.map));
-  out.writePixels(map.map->height);
-}
-
 ImageF read_map(Imf::MultiPartInputFile& file, int part, const std::vector<const char*>& channels) {
   Imf::InputPart in(file, part);
   const Imath::Box2i window = in.header().dataWindow();
   ImageF map(window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, static_cast<int>(channels.size()));
-  in.setFrameBuffer(frame_buffer(channels, map));
+  in.setFrameBuffer(float_buffer(channels, map));
   in.readPixels(window.min.y, window.max.y);
   return map;
-}
-
-ShadedEmitter emitter_of(const Imf::Header& header, const std::string& path) {
-  const auto vector = [&](const char* name) {
-    const Imath::V3f& v = attribute<Imf::V3fAttribute>(header, name, path);
-    return Eigen::Vector3f(v.x, v.y, v.z);
-  };
-  const auto vector2 = [&](const char* name) {
-    const Imath::V2f& v = attribute<Imf::V2fAttribute>(header, name, path);
-    return Eigen::Vector2f(v.x, v.y);
-  };
-  ShadedEmitter e;
-  e.emitter = {vector("mfPosition"), attribute<Imf::FloatAttribute>(header, "mfRadius", path),
-               attribute<Imf::IntAttribute>(header, "mfViews", path)};
-  e.radiance = vector("mfRadiance");
-  e.occluder_share = attribute<Imf::FloatAttribute>(header, "mfOccluderShare", path);
-  e.plane_height_m = attribute<Imf::FloatAttribute>(header, "mfPlaneHeight", path);
-  e.mask_min_m = vector2("mfMaskMin");
-  e.mask_max_m = vector2("mfMaskMax");
-  return e;
 }
 
 void read_maps(Imf::MultiPartInputFile& file, LightField& field, const std::string& path) {
   Surroundings& s = field.surroundings;
   for (int part = 1; part < file.parts(); ++part) {
     const std::string name = file.header(part).name();
-    const Imath::V3f& centre = attribute<Imf::V3fAttribute>(file.header(part), "mfCentre", path);
-    s.centre_in_world = {centre.x, centre.y, centre.z};
+    s.centre_in_world = centre_from(file.header(part), path);
     if (name == "inverseDistance") s.inverse_distance = read_map(file, part, {"Y"});
     if (name == "distanceConfidence") s.confidence = read_map(file, part, {"Y"});
     if (name == "panorama") s.panorama = read_map(file, part, {"R", "G", "B", "A"});
     if (!name.starts_with("emitter")) continue;
-    field.emitters.push_back(emitter_of(file.header(part), path));
+    field.emitters.push_back(emitter_from(file.header(part), path));
     field.emitters.back().mask = read_map(file, part, {"visibility", "weight", "share"});
   }
 }
@@ -308,25 +104,6 @@ void use_all_cores() {
 }
 
 }  // namespace
-
-void write_light_field(const std::filesystem::path& path, const LightField& field) {
-  use_all_cores();
-  AtomicFile file(path);
-  try {
-    std::vector<Imf::Header> headers{header_of(field)};
-    for (const NamedMap& map : maps_of(field))
-      headers.push_back(header_of(map, field.surroundings, headers.front().displayWindow()));
-    Imf::MultiPartOutputFile out(file.path().c_str(), headers.data(), static_cast<int>(headers.size()));
-    write_tiles(out, field);
-    int part = 1;
-    for (const NamedMap& map : maps_of(field)) write_map(out, part++, map);
-  } catch (const std::exception& e) {
-    throw InputError(
-        path.string(), "",
-        fmt::format("cannot be written ({}): check the folder, its permissions and the free space", e.what()));
-  }
-  file.commit();
-}
 
 LightField read_light_field(const std::filesystem::path& path) {
   use_all_cores();

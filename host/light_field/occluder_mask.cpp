@@ -81,10 +81,11 @@ ImageF window_sums(const ImageF& in) {
 }
 
 // Variance and how many texels know it, for one distance everywhere; not summed yet.
-ImageF disagreement(const std::vector<FieldView>& views, const ShadedEmitter& e, float share) {
+ImageF disagreement(const std::vector<FieldView>& views, const ShadedEmitter& e, float share, const Team& team) {
   ImageF out(sweep_side, sweep_side, 2);
   const float angle = (e.mask_max_m - e.mask_min_m).mean() / sweep_side * (1 - share);
   tbb::parallel_for(0, sweep_side, [&](int y) {
+    if (!team.has(static_cast<std::size_t>(y))) return;
     for (int x = 0; x < sweep_side; ++x) {
       const Votes votes = ask(views, e, e.occluder_point(mask_position(e, sweep_side, x, y), share), angle);
       constexpr int enough = 4;
@@ -93,6 +94,7 @@ ImageF disagreement(const std::vector<FieldView>& views, const ShadedEmitter& e,
       out.at(x, y, 1) = 1;
     }
   });
+  share_rows(team, out);
   return out;
 }
 
@@ -119,9 +121,9 @@ std::size_t usual_share(const std::vector<ImageF>& sweep) {
 }
 
 // Share of the way from the plane to the emitter at which something may hide it, by line to the plane; one channel.
-ImageF sweep_distances(const std::vector<FieldView>& views, ShadedEmitter& e) {
+ImageF sweep_distances(const std::vector<FieldView>& views, const Team& team, ShadedEmitter& e) {
   std::vector<ImageF> sweep;
-  for (std::size_t i = 0; i < shares; ++i) sweep.push_back(disagreement(views, e, share_of(i)));
+  for (std::size_t i = 0; i < shares; ++i) sweep.push_back(disagreement(views, e, share_of(i), team));
   const std::size_t usual = usual_share(sweep);
   e.occluder_share = share_of(usual);
   std::vector<ImageF> sums;
@@ -148,16 +150,18 @@ ImageF sweep_distances(const std::vector<FieldView>& views, ShadedEmitter& e) {
 
 }  // namespace
 
-void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, ShadedEmitter& e) {
+void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const Team& team,
+                    ShadedEmitter& e) {
   const auto corner = [&](const Eigen::Vector2d& p) -> Eigen::Vector2f {
     return (rectangle.world_from_plane * Eigen::Vector3d(p.x(), p.y(), 0)).head<2>().cast<float>();
   };
   e.mask_min_m = corner(rectangle.min_m).array() - margin_m;
   e.mask_max_m = corner(rectangle.max_m).array() + margin_m;
-  const ImageF distances = sweep_distances(views, e);
+  const ImageF distances = sweep_distances(views, team, e);
   e.mask = ImageF(mask_side, mask_side, 3);
   const float texel_m = (e.mask_max_m - e.mask_min_m).mean() / mask_side;
   tbb::parallel_for(0, mask_side, [&](int y) {
+    if (!team.has(static_cast<std::size_t>(y))) return;
     for (int x = 0; x < mask_side; ++x) {
       const float share = distances.at(x * sweep_side / mask_side, y * sweep_side / mask_side);
       const Votes votes =
@@ -168,6 +172,7 @@ void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& r
       e.mask.at(x, y, 1) = std::min(votes.weight, 1.0F);
     }
   });
+  share_rows(team, e.mask);
 }
 
 }  // namespace mf

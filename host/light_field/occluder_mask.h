@@ -6,6 +6,7 @@
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/shaded_emitter.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -15,6 +16,6 @@ namespace mf {
 // those that meet the emitter must agree. At the wrong distance an occluder's edge makes them differ. So along each
 // line from the emitter's centre to the plane the distance is chosen at which, in a window about it, the views disagree
 // least: a plane sweep, one distance for each leaf.
-void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle&, ShadedEmitter&);
+void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle&, const Team&, ShadedEmitter&);
 
 }  // namespace mf

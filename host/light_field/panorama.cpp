@@ -53,7 +53,7 @@ void fill_from_around(ImageF& panorama, const IsHole& is_hole) {
 }  // namespace
 
 ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& surroundings,
-                     const EmitterBlender& emitters, int width) {
+                     const EmitterBlender& emitters, int width, const Team& team) {
   constexpr int k = 4;  // few: every further view blurs what the distance gets wrong
   const int height = width / 4;
   const float texel_rad = 2 * std::numbers::pi_v<float> / static_cast<float>(width);
@@ -61,6 +61,7 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
   std::vector<std::uint32_t> all_views(views.size());
   std::iota(all_views.begin(), all_views.end(), 0U);
   tbb::parallel_for(0, height, [&](int y) {
+    if (!team.has(static_cast<std::size_t>(y))) return;
     std::vector<ViewPenalty> ranked;
     std::array<ViewWeight, k> weights;
     for (int x = 0; x < width; ++x) {
@@ -93,6 +94,7 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
       for (int c = 0; c < 4; ++c) panorama.at(x, y, c) = sum[c];
     }
   });
+  share_rows(team, panorama);
   fill_from_around(panorama, [&](int x, int y) {
     const Eigen::Vector3f d = direction_of(x, y, panorama);
     return panorama.at(x, y, 3) <= 0 && emitters.concerns(surroundings.centre_in_world, d, texel_rad);

@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/light_field/resample.h"
-#include "host/light_field/panorama.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <mutex>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "common/check.h"
+#include "host/light_field/light_field_writer.h"
+#include "host/light_field/panorama.h"
+#include "host/light_field/plane_tiles.h"
 #include "host/light_field/tile_resampler.h"
 
 namespace mf {
@@ -26,10 +29,10 @@ double seconds_since(Clock::time_point start) {
 }
 
 Surroundings choose_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                                 const std::string& proxy, int k, std::span<const Emitter> emitters,
+                                 const std::string& proxy, int k, std::span<const Emitter> emitters, const Team& team,
                                  std::vector<SphereScore>& scores) {
   if (proxy == "plane") return {};
-  if (proxy == "auto") return find_surroundings(views, rectangle, emitters);
+  if (proxy == "auto") return find_surroundings(views, rectangle, emitters, team);
   if (const auto radius = parse_sphere(proxy)) return sphere_surroundings(centre_of(rectangle), *radius);
   scores = score_spheres(views, rectangle, k);
   const auto best = std::min_element(scores.begin(), scores.end(), [](const SphereScore& a, const SphereScore& b) {
@@ -48,30 +51,6 @@ std::string options_to_json(const ResampleOptions& o, int k, const Surroundings&
   return json.dump();
 }
 
-double mean_confidence(const LightField& field) {
-  double sum = 0, weights = 0;
-  for (std::size_t i = 0; i < field.directions.size(); ++i) {
-    const double w = static_cast<double>(field.directions.solid_angles_sr[i] * field.directions.directions[i].z());
-    double tile = 0;
-    for (std::size_t t = 0; t < field.texel_count(); ++t) tile += static_cast<double>(field.tile(i)[t].w());
-    sum += w * tile / static_cast<double>(field.texel_count());
-    weights += w;
-  }
-  return sum / weights;
-}
-
-void fill_tiles(const std::vector<FieldView>& views, LightField& field, const EmitterBlender& emitters, int k,
-                const Progress& progress) {
-  tbb::enumerable_thread_specific<TileResampler> resamplers([&] { return TileResampler(views, field, emitters, k); });
-  std::mutex reporting;
-  std::size_t done = 0;
-  tbb::parallel_for(std::size_t{0}, field.directions.size(), [&](std::size_t i) {
-    resamplers.local().fill(i, field.tile(i));
-    const std::lock_guard lock(reporting);
-    report_progress(progress, "resampling", static_cast<double>(++done) / static_cast<double>(field.directions.size()));
-  });
-}
-
 }  // namespace
 
 std::optional<std::string> ResampleOptions::validate() const {
@@ -86,34 +65,235 @@ std::optional<std::string> ResampleOptions::validate() const {
   return std::nullopt;
 }
 
-ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                        const ResampleOptions& options, const Progress& progress) {
+// ---- tiles on demand ----
+
+struct Resampling::Impl {
+  const std::vector<FieldView>& views;
+  int k = 0;
+  LightField field;
+  std::vector<SphereScore> sphere_scores;
+  double focusing_s = 0;
+  // The plane needs the one, every other proxy the other.
+  std::optional<RectifiedViews> rectified;
+  std::optional<EmitterBlender> emitters;
+  std::optional<tbb::enumerable_thread_specific<PlaneTiles>> plane_tiles;
+  std::optional<tbb::enumerable_thread_specific<TileResampler>> resamplers;
+};
+
+Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
+                       const ResampleOptions& options, const Team& team, const Progress& progress)
+    : impl_(new Impl{views, 0, {}, {}, 0, {}, {}, {}, {}}) {
   check(!options.validate().has_value(), "resample options are validated by the caller");
-  ResampleResult result;
-  result.views = views.size();
-  LightField& field = result.field;
+  const auto start = Clock::now();
+  report_progress(progress, "focusing", 0);
+  Impl& i = *impl_;
+  LightField& field = i.field;
   field.plane = rectangle;
   field.resolution = options.size;
   field.directions = geodesic_hemisphere(options.directions);
   const int k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
-
-  auto start = Clock::now();
-  report_progress(progress, "focusing", 0);
+  i.k = k;
   const std::vector<Emitter> emitters = options.proxy == "plane" ? std::vector<Emitter>{} : find_emitters(views);
-  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, result.sphere_scores);
-  const EmitterBlender emitter_blender(views, field.surroundings, emitters, rectangle);
-  field.emitters = emitter_blender.emitters();
-  if (!field.surroundings.is_plane())
-    field.surroundings.panorama = make_panorama(views, field.surroundings, emitter_blender, panorama_width);
-  report_progress(progress, "focusing", 1);
-  result.seconds["focusing"] = seconds_since(start);
+  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, team, i.sphere_scores);
   field.options_json = options_to_json(options, k, field.surroundings);
+  if (field.surroundings.is_plane()) {
+    i.rectified.emplace(views, rectangle, options.size);
+    i.plane_tiles.emplace([&i, k] { return PlaneTiles(*i.rectified, i.field, k); });
+  } else {
+    i.emitters.emplace(views, field.surroundings, emitters, rectangle, team);
+    field.emitters = i.emitters->emitters();
+    field.surroundings.panorama = make_panorama(views, field.surroundings, *i.emitters, panorama_width, team);
+    i.resamplers.emplace([&i, k] { return TileResampler(i.views, i.field, *i.emitters, k); });
+  }
+  report_progress(progress, "focusing", 1);
+  i.focusing_s = seconds_since(start);
+}
 
-  start = Clock::now();
-  field.rgbc.assign(field.directions.size() * field.texel_count(), Eigen::Vector4f::Zero());
-  fill_tiles(views, field, emitter_blender, k, progress);
-  result.seconds["blending"] = seconds_since(start);
-  result.mean_confidence = mean_confidence(field);
+Resampling::~Resampling() = default;
+
+const LightField& Resampling::field() const {
+  return impl_->field;
+}
+int Resampling::k() const {
+  return impl_->k;
+}
+const std::vector<SphereScore>& Resampling::sphere_scores() const {
+  return impl_->sphere_scores;
+}
+std::size_t Resampling::views() const {
+  return impl_->views.size();
+}
+double Resampling::focusing_s() const {
+  return impl_->focusing_s;
+}
+
+void Resampling::fill(std::size_t direction, Eigen::Vector4f* tile) {
+  if (impl_->plane_tiles)
+    impl_->plane_tiles->local().fill(direction, tile);
+  else
+    impl_->resamplers->local().fill(direction, tile);
+}
+
+// ---- all of them ----
+
+namespace {
+
+// A tile on its way: packed in any thread, stored in the order of directions.
+struct FinishedTile {
+  std::size_t direction = 0;
+  std::string packed;
+  double mean_confidence = 0;
+  double blending_s = 0;
+  double packing_s = 0;
+};
+
+double mean_confidence_of(const std::vector<Eigen::Vector4f>& tile) {
+  double sum = 0;
+  for (const Eigen::Vector4f& texel : tile) sum += static_cast<double>(texel.w());
+  return sum / static_cast<double>(tile.size());
+}
+
+// Makes the tiles that are this rank's: (direction, tile) → string by `pack` in many threads, then `store` in the order
+// of directions.
+template <typename Pack, typename Store>
+void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, const Store& store) {
+  const std::size_t directions = resampling.field().directions.size();
+  const std::size_t texels = resampling.field().texel_count();
+  // So many that a slow tile does not hold up the others.
+  const std::size_t tiles_at_hand = 8 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  std::size_t next = team.rank();
+  const auto deal = [&](tbb::flow_control& control) {
+    const std::size_t direction = next;
+    next += team.size();
+    if (direction >= directions) control.stop();
+    return direction;
+  };
+  const auto make = [&](std::size_t direction) {
+    thread_local std::vector<Eigen::Vector4f> tile;
+    tile.resize(texels);
+    FinishedTile finished;
+    finished.direction = direction;
+    auto start = Clock::now();
+    resampling.fill(direction, tile.data());
+    finished.blending_s = seconds_since(start);
+    finished.mean_confidence = mean_confidence_of(tile);
+    start = Clock::now();
+    finished.packed = pack(direction, tile);
+    finished.packing_s = seconds_since(start);
+    return finished;
+  };
+  tbb::parallel_pipeline(
+      tiles_at_hand,
+      tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, deal) &
+          tbb::make_filter<std::size_t, FinishedTile>(tbb::filter_mode::parallel, make) &
+          tbb::make_filter<FinishedTile, void>(tbb::filter_mode::serial_in_order,
+                                               [&](FinishedTile finished) { store(std::move(finished)); }));
+}
+
+// What is summed up over the tiles, in their order.
+struct Tally {
+  double confidence = 0, weights = 0, blending_s = 0, packing_s = 0;
+
+  void add(const DirectionSet& set, const FinishedTile& tile) {
+    const double w = static_cast<double>(set.solid_angles_sr[tile.direction] * set.directions[tile.direction].z());
+    confidence += w * tile.mean_confidence;
+    weights += w;
+    blending_s += tile.blending_s;
+    packing_s += tile.packing_s;
+  }
+  void enter(ResampleResult& result) const {
+    const double threads = tbb::this_task_arena::max_concurrency();
+    result.mean_confidence = confidence / weights;
+    result.seconds["blending"] = blending_s / threads;
+    result.seconds["packing"] = packing_s / threads;
+  }
+};
+
+ResampleResult start_of_result(const Resampling& resampling) {
+  ResampleResult result;
+  result.views = resampling.views();
+  result.field = resampling.field();
+  result.sphere_scores = resampling.sphere_scores();
+  result.seconds["focusing"] = resampling.focusing_s();
+  return result;
+}
+
+// A tile as one rank sends it to another: its mean confidence, then the packed bytes.
+std::string to_message(const FinishedTile& tile) {
+  std::string message(sizeof tile.mean_confidence, '\0');
+  std::memcpy(message.data(), &tile.mean_confidence, sizeof tile.mean_confidence);
+  return message + tile.packed;
+}
+FinishedTile from_message(std::size_t direction, const std::string& message) {
+  FinishedTile tile;
+  tile.direction = direction;
+  std::memcpy(&tile.mean_confidence, message.data(), sizeof tile.mean_confidence);
+  tile.packed = message.substr(sizeof tile.mean_confidence);
+  return tile;
+}
+
+}  // namespace
+
+ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
+                        const ResampleOptions& options, const Progress& progress) {
+  Resampling resampling(views, rectangle, options, Team(), progress);
+  ResampleResult result = start_of_result(resampling);
+  LightField& field = result.field;
+  field.rgbc.resize(field.directions.size() * field.texel_count());
+  Tally tally;
+  const auto keep = [&](std::size_t direction, const std::vector<Eigen::Vector4f>& tile) {
+    std::copy(tile.begin(), tile.end(), field.tile(direction));
+    return std::string();
+  };
+  make_tiles(resampling, Team(), keep, [&](const FinishedTile& tile) {
+    tally.add(field.directions, tile);
+    report_progress(progress, "resampling",
+                    static_cast<double>(tile.direction + 1) / static_cast<double>(field.directions.size()));
+  });
+  tally.enter(result);
+  return result;
+}
+
+ResampleResult resample_to_file(Resampling& resampling, const std::filesystem::path& path, bool absolute, Team& team,
+                                const Progress& progress) {
+  ResampleResult result = start_of_result(resampling);
+  result.field.absolute = absolute;
+  const DirectionSet& set = result.field.directions;
+  const auto pack = [&](std::size_t, const std::vector<Eigen::Vector4f>& tile) {
+    return LightFieldWriter::pack(tile.data(), result.field.resolution);
+  };
+  Tally tally;
+  if (team.rank() > 0) {
+    make_tiles(resampling, team, pack, [&](const FinishedTile& tile) {
+      tally.add(set, tile);
+      team.send(to_message(tile));
+    });
+    tally.enter(result);
+    return result;
+  }
+  LightFieldWriter writer(path, result.field);
+  double writing_s = 0;
+  std::size_t next = 0;
+  const auto append = [&](const FinishedTile& tile) {
+    const auto start = Clock::now();
+    writer.append(tile.packed);
+    writing_s += seconds_since(start);
+    tally.add(set, tile);
+    ++next;
+    report_progress(progress, "resampling", static_cast<double>(next) / static_cast<double>(set.size()));
+  };
+  const auto append_others = [&] {
+    while (next < set.size() && !team.has(next)) append(from_message(next, team.receive(next % team.size())));
+  };
+  make_tiles(resampling, team, pack, [&](const FinishedTile& tile) {
+    append_others();
+    append(tile);
+  });
+  append_others();
+  const auto start = Clock::now();
+  writer.finish();
+  result.seconds["writing"] = writing_s + seconds_since(start);
+  tally.enter(result);
   return result;
 }
 

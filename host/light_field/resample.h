@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/surroundings_search.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -31,16 +34,47 @@ struct ResampleOptions {
 struct ResampleResult {
   LightField field;
   std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
-  std::map<std::string, double> seconds;   // by stage
+  std::map<std::string, double> seconds;   // by stage; blending and packing: of all threads, over their number
   std::size_t views = 0;
   double mean_confidence = 0;  // cosine-weighted over directions, mean over the plane
 };
 
-// The views resampled into L(p, ω) on a plane parallel to the ground (Ihrke et al. 2008, §4.3), each ray blended from
-// the k best views (Buehler et al. 2001, §4.1), seen over the proxy: see docs/light_field.md.
-// `views` see the world frame; `rectangle` is the plane's part to cover.
+// A capture that is focused and ready to be resampled (Ihrke et al. 2008, §4.3), each ray blended from the k best views
+// (Buehler et al. 2001, §4.1), seen over the proxy: see docs/light_field.md. Tiles are made on demand.
+class Resampling {
+ public:
+  // `views` see the world frame and outlive this; `rectangle` is the plane's part to cover.
+  // A team shares the work of focusing.
+  Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const ResampleOptions&, const Team&,
+             const Progress&);
+  ~Resampling();
+  Resampling(const Resampling&) = delete;
+  Resampling& operator=(const Resampling&) = delete;
+
+  // Everything but the texels.
+  [[nodiscard]] const LightField& field() const;
+  [[nodiscard]] int k() const;  // views blended for a ray
+  // One direction's tile, resolution² texels. In any thread, in any order: the result is the same.
+  void fill(std::size_t direction, Eigen::Vector4f* tile);
+
+  [[nodiscard]] const std::vector<SphereScore>& sphere_scores() const;
+  [[nodiscard]] std::size_t views() const;
+  [[nodiscard]] double focusing_s() const;  // how long the construction took
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// All tiles, in memory: 16 bytes a texel and direction.
 [[nodiscard]] ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
                                       const ResampleOptions&, const Progress&);
+
+// All tiles, written to a file as they are made; the result's field has no texels. `absolute`: radiance is in the units
+// of the reference reading. A team deals out the directions; rank 0 writes, the same bytes as one process alone, and
+// its result is the one that counts.
+[[nodiscard]] ResampleResult resample_to_file(Resampling&, const std::filesystem::path&, bool absolute, Team&,
+                                              const Progress&);
 
 // The rectangle of the plane z = height (world) that the mirrors' openings cover: the box around all points that at
 // least a tenth as many views pass as the best-covered point. Nothing when no view's rays come down to the plane.

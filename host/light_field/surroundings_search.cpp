@@ -150,10 +150,12 @@ float cost_of(std::vector<float>& votes, int level) {
          far_preference_stops * static_cast<float>(level) / (level_count - 1);
 }
 
-CostVolume sweep(const std::vector<FieldView>& views, const Eigen::Vector3f& centre, float level_step) {
+CostVolume sweep(const std::vector<FieldView>& views, const Eigen::Vector3f& centre, float level_step,
+                 const Team& team) {
   CostVolume cost(static_cast<std::size_t>(level_count),
                   ImageF(map_size, map_size, 1, std::numeric_limits<float>::infinity()));
   tbb::parallel_for(0, map_size, [&](int y) {
+    if (!team.has(static_cast<std::size_t>(y))) return;
     std::vector<float> votes;
     for (int x = 0; x < map_size; ++x) {
       const Eigen::Vector3f d =
@@ -167,6 +169,7 @@ CostVolume sweep(const std::vector<FieldView>& views, const Eigen::Vector3f& cen
       }
     }
   });
+  for (ImageF& level : cost) share_rows(team, level);
   return cost;
 }
 
@@ -246,12 +249,12 @@ void set_distance(Surroundings& s, const Emitter& emitter) {
 }  // namespace
 
 Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                               std::span<const Emitter> emitters) {
+                               std::span<const Emitter> emitters, const Team& team) {
   const float nearest_m = nearest_share * 0.5F * static_cast<float>(rectangle.size_m().norm());
   const float level_step = 1 / nearest_m / static_cast<float>(level_count - 1);
   Surroundings s;
   s.centre_in_world = centre_of(rectangle);
-  CostVolume cost = sweep(views, s.centre_in_world, level_step);
+  CostVolume cost = sweep(views, s.centre_in_world, level_step, team);
   tbb::parallel_for(std::size_t{0}, cost.size(), [&](std::size_t level) { cost[level] = smoothed(cost[level]); });
   s.inverse_distance = ImageF(map_size, map_size, 1);
   s.confidence = ImageF(map_size, map_size, 1);

@@ -8,6 +8,7 @@
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/surroundings.h"
+#include "host/team/team.h"
 
 namespace mf {
 
@@ -28,7 +29,7 @@ struct SphereScore {
 // distance serves.
 // Directions about an emitter get the emitter's distance: it matters most, and a leaf before it hides it best.
 [[nodiscard]] Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle&,
-                                             std::span<const Emitter>);
+                                             std::span<const Emitter>, const Team& = {});
 
 // World position of the rectangle's centre.
 [[nodiscard]] Eigen::Vector3f centre_of(const PlaneRectangle&);

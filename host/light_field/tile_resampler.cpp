@@ -6,20 +6,21 @@
 #include <array>
 #include <cmath>
 
+#include "host/light_field/plane_tiles.h"
+
 namespace mf {
 
 namespace {
 
-constexpr int vertex_step = 4;     // texels between vertices
-constexpr int block_vertices = 2;  // vertex steps along a block: all views are ranked at its corners
-constexpr int block_step = vertex_step * block_vertices;
-constexpr int patch = block_vertices + 1;  // vertices along a block, both ends counted
+constexpr int block_vertices = block_side / vertex_step;
 constexpr std::size_t spare_views = 4;  // ranked beyond k, so that the k best of any texel are among its corners' lists
 constexpr std::size_t spare_views_near_emitter = 26;  // there many views have no say
 constexpr int fine_splits = 3;                        // and a cell near an emitter in 6 · 2³
 constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
-constexpr float smallest_weight = 0.02F;  // a view that shows less than this of the cell does not speak for it
-constexpr float same_ray = 1e-4F;         // metres (plane proxy: radians): rays closer than this are the same
+constexpr float same_ray = 1e-4F;                     // rays closer than this are the same
+constexpr float largest_jump = 0.1F;                  // of the cell, see is_rough()
+constexpr int outline_points = 3;                     // along a side: where it is tested who looks that way
+constexpr float outline_margin = 0.3F;                // of the outline's size, for what lies between those points
 
 }  // namespace
 
@@ -28,30 +29,33 @@ TileResampler::TileResampler(const std::vector<FieldView>& views, const LightFie
     : views_(views),
       field_(field),
       emitters_(emitters),
+      grid_(field.plane, field.resolution),
       k_(k),
-      blocks_((field.resolution + block_step - 1) / block_step),
+      blocks_((field.resolution + block_side - 1) / block_side),
       vertices_(blocks_ * block_vertices + 1),
       vertex_(static_cast<std::size_t>(vertices_ * vertices_)),
-      best_views_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))),
-      mark_(views.size(), 0),
-      weights_(static_cast<std::size_t>(k)) {}
+      best_lookers_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))),
+      reach_m_(best_lookers_.size(), 0) {}
 
 void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
   prepare(direction);
+  find_lookers();
   for (int y = 0; y <= blocks_; ++y)
     for (int x = 0; x <= blocks_; ++x) rank_views(x, y);
-  const int n = field_.resolution;
-  for (int by = 0; by < blocks_; ++by)
-    for (int bx = 0; bx < blocks_; ++bx) {
-      gather_candidates(bx, by);
-      if (near_emitter(bx, by)) {
-        fill_near_emitter(bx, by, tile);
-        continue;
-      }
-      fetch_candidates(bx, by);
-      for (int y = by * block_step; y < std::min(n, (by + 1) * block_step); ++y)
-        for (int x = bx * block_step; x < std::min(n, (bx + 1) * block_step); ++x) tile[y * n + x] = blend(x, y);
+  for (int y = 0; y < blocks_; ++y)
+    for (int x = 0; x < blocks_; ++x) {
+      gather_candidates(x, y);
+      Lanes3 colour{};
+      Lanes confidence{};
+      if (near_emitter(x, y))
+        blend_near_emitter(x, y, colour, confidence);
+      else if (is_rough(x, y))
+        blend_rough(x, y, colour, confidence);
+      else
+        blend(x, y, colour, confidence);
+      store_block(colour, confidence, x, y, field_.resolution, tile);
     }
+  row_count_ += static_cast<std::uint32_t>(vertices_);
 }
 
 void TileResampler::prepare(std::size_t i) {
@@ -65,23 +69,212 @@ void TileResampler::prepare(std::size_t i) {
   for (int y = 0; y < vertices_; ++y)
     for (int x = 0; x < vertices_; ++x) {
       Vertex& v = vertex_[static_cast<std::size_t>(y * vertices_ + x)];
-      v.p = point(static_cast<float>(x * vertex_step), static_cast<float>(y * vertex_step));
-      v.focus = focus(v.p);
+      v.p = grid_.at(static_cast<float>(x * vertex_step), static_cast<float>(y * vertex_step));
+      v.focus = proxy_point(v.p, cell_.direction, field_.surroundings.inverse_distance_along(v.p, cell_.direction));
       emitter = emitter || emitters_.concerns(v.p, cell_.direction, cell_.angle_rad);
     }
   cell_.fine_parts.clear();
-  if (!emitter || field_.surroundings.is_plane()) return;
+  if (!emitter) return;
   cell_.fine_parts = split_cell(field_.directions, i, fine_splits);
   for (CellSample& part : cell_.fine_parts) part.direction = world_from_plane * part.direction;
 }
 
+// The others see none of the tile's proxy points, as their outline in the view lies beside its picture.
+void TileResampler::find_lookers() {
+  lookers_.views.clear();
+  lookers_.centre_x.clear();
+  lookers_.centre_y.clear();
+  lookers_.centre_z.clear();
+  for (std::uint32_t v = 0; v < views_.size(); ++v) {
+    const FieldView& view = views_[v];
+    Eigen::Array2f low = Eigen::Array2f::Constant(INFINITY), high = -low;
+    bool behind = false;
+    for (int i = 0; i < outline_points * outline_points; ++i) {
+      const int x = i % outline_points * (vertices_ - 1) / (outline_points - 1);
+      const int y = i / outline_points * (vertices_ - 1) / (outline_points - 1);
+      const Eigen::Vector3f pixel = pixel_of(view, vertex(x, y).focus);
+      behind = behind || pixel.z() <= 0;
+      const Eigen::Array2f at = pixel.head<2>().array() / pixel.z();
+      low = low.min(at);
+      high = high.max(at);
+    }
+    const Eigen::Array2f reach = outline_margin * (high - low) + 2 * cell_.angle_rad * view.focal_px;
+    const Eigen::Array2f size(static_cast<float>(view.levels.front().width()),
+                              static_cast<float>(view.levels.front().height()));
+    if (!behind && ((high + reach < 0).any() || (low - reach > size).any())) continue;
+    lookers_.views.push_back(v);
+    lookers_.centre_x.push_back(view.centre_in_world.x());
+    lookers_.centre_y.push_back(view.centre_in_world.y());
+    lookers_.centre_z.push_back(view.centre_in_world.z());
+  }
+  const std::size_t count = lookers_.views.size();
+  bounds_.resize(std::max(bounds_.size(), count));
+  mark_.resize(std::max(mark_.size(), count), 0);
+  seen_.resize(std::max(seen_.size(), count * patch_side * static_cast<std::size_t>(vertices_)));
+}
+
+void TileResampler::rank_views(int corner_x, int corner_y) {
+  const Vertex& v = vertex(corner_x * block_vertices, corner_y * block_vertices);
+  squared_ray_distances(v.p, v.focus, lookers_.centre_x.data(), lookers_.centre_y.data(), lookers_.centre_z.data(),
+                        lookers_.views.size(), bounds_.data());
+  const auto squared_penalty = [&](std::size_t i) {
+    const FieldView& view = views_[lookers_.views[i]];
+    const Eigen::Vector3f pixel = pixel_of(view, v.focus);
+    if (pixel.z() <= 0) return INFINITY;
+    const float weight =
+        view.fetch(level_for_angle(view, v.focus, cell_.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
+    return weight >= smallest_view_weight ? bounds_[i] / (weight * weight) : INFINITY;
+  };
+  const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
+  const std::size_t corner = static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x);
+  auto& best = best_lookers_[corner];
+  best.clear();
+  float farthest = 0;
+  for (const ViewPenalty& found :
+       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(k_) + spare, squared_penalty)) {
+    best.push_back(found.view);
+    farthest = std::max(farthest, bounds_[found.view]);
+  }
+  reach_m_[corner] = std::sqrt(farthest);
+}
+
+// The views that any corner of a block ranked among its best, each once.
+void TileResampler::gather_candidates(int bx, int by) {
+  ++block_count_;
+  candidates_.clear();
+  candidate_views_.clear();
+  for (int corner = 0; corner < 4; ++corner)
+    for (const std::uint32_t v :
+         best_lookers_[static_cast<std::size_t>((by + corner / 2) * (blocks_ + 1) + bx + corner % 2)]) {
+      if (mark_[v] == block_count_) continue;
+      mark_[v] = block_count_;
+      candidates_.push_back(v);
+    }
+  std::sort(candidates_.begin(), candidates_.end());  // sums in one order, however they were found
+  for (const std::uint32_t v : candidates_) candidate_views_.push_back(lookers_.views[v]);
+}
+
+// Fetched once for the blocks that share a vertex: rows of blocks are filled one after the other.
+const Eigen::Vector4f& TileResampler::seen_at(std::size_t looker, int x, int y) {
+  const std::uint32_t stamp = row_count_ + static_cast<std::uint32_t>(y) + 1;
+  Seen& seen =
+      seen_[(looker * patch_side + static_cast<std::size_t>(y) % patch_side) * static_cast<std::size_t>(vertices_) +
+            static_cast<std::size_t>(x)];
+  if (seen.stamp != stamp) {
+    seen.colour = fetch_cell(views_[lookers_.views[looker]], vertex(x, y));
+    seen.stamp = stamp;
+  }
+  return seen.colour;
+}
+
+// Mean over the cell of what one view saw of it: premultiplied colour and weight.
+Eigen::Vector4f TileResampler::fetch_cell(const FieldView& view, const Vertex& v) const {
+  const int level = level_for_angle(view, v.focus, cell_.part_angle_rad);
+  const PremultipliedImage& image = view.levels[static_cast<std::size_t>(level)];
+  const float scale = 1.0F / static_cast<float>(1 << level);
+  const Eigen::Matrix3f turn = view.pixel_from_world.leftCols<3>();
+  const Eigen::Vector3f base = v.focus.w() * (turn * v.p + view.pixel_from_world.col(3));
+  PremultipliedImage::Lanes sum{};
+  float solid_angle = 0;
+  for (const CellSample& part : cell_.parts) {
+    const Eigen::Vector3f pixel = base + turn * part.direction;
+    solid_angle += part.solid_angle_sr;
+    const float inverse = scale / pixel.z();
+    if (pixel.z() > 0) image.add_bilinear(pixel.x() * inverse, pixel.y() * inverse, part.solid_angle_sr, sum);
+  }
+  return image.decoded(sum) / solid_angle;
+}
+
+void TileResampler::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {
+  Lanes3 p;
+  Lanes4 focus;
+  Patch<Eigen::Vector4f> patch;
+  const int x0 = bx * block_vertices, y0 = by * block_vertices;
+  for (std::size_t i = 0; i < patch.size(); ++i)
+    patch[i] = vertex(x0 + static_cast<int>(i % patch_side), y0 + static_cast<int>(i / patch_side)).focus;
+  interpolate(patch, focus);
+  set_points(grid_.at(static_cast<float>(bx * block_side) + 0.5F, static_cast<float>(by * block_side) + 0.5F),
+             grid_.step_x, grid_.step_y, p);
+  patches_.resize(candidates_.size());
+  penalties_.resize(candidates_.size());
+  weights_.resize(candidates_.size());
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    Patch<float> weight;
+    for (std::size_t i = 0; i < weight.size(); ++i) {
+      patches_[c][i] =
+          seen_at(candidates_[c], x0 + static_cast<int>(i % patch_side), y0 + static_cast<int>(i / patch_side));
+      weight[i] = patches_[c][i].w();
+    }
+    interpolate(weight, weights_[c]);
+    distance_penalties(p, focus, views_[candidate_views_[c]].centre_in_world, weights_[c], penalties_[c]);
+  }
+  weights_of(penalties_, weights_, k_, same_ray, confidence);
+  for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(patches_[c], penalties_[c], colour);
+}
+
+// ---- where the proxy's distance jumps ----
+
+// Whether the proxy's distance changes so much from one vertex to the next that a view's pixel moves by a good part of
+// the cell: of views that pass the ray at a distance d, a change of inverse distance Δs moves it by d Δs.
+bool TileResampler::is_rough(int bx, int by) const {
+  float reach = 0;
+  for (int corner = 0; corner < 4; ++corner)
+    reach = std::max(reach, reach_m_[static_cast<std::size_t>((by + corner / 2) * (blocks_ + 1) + bx + corner % 2)]);
+  const float most = largest_jump * cell_.angle_rad / std::max(reach, 1e-6F);
+  const int x0 = bx * block_vertices, y0 = by * block_vertices;
+  for (int y = y0; y <= y0 + block_vertices; ++y)
+    for (int x = x0; x <= x0 + block_vertices; ++x) {
+      const float here = vertex(x, y).focus.w();
+      if (x < x0 + block_vertices && std::abs(vertex(x + 1, y).focus.w() - here) > most) return true;
+      if (y < y0 + block_vertices && std::abs(vertex(x, y + 1).focus.w() - here) > most) return true;
+    }
+  return false;
+}
+
+// Every texel by itself.
+void TileResampler::blend_rough(int bx, int by, Lanes3& colour, Lanes& confidence) {
+  Lanes3 p;
+  Lanes4 focus;
+  std::array<Vertex, block_lanes> texel;
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    Vertex& t = texel[i];
+    t.p = grid_.at(static_cast<float>(bx * block_side) + static_cast<float>(i % block_side) + 0.5F,
+                   static_cast<float>(by * block_side) + static_cast<float>(i / block_side) + 0.5F);
+    t.focus = proxy_point(t.p, cell_.direction, field_.surroundings.inverse_distance_along(t.p, cell_.direction));
+    p.x.v[i] = t.p.x();
+    p.y.v[i] = t.p.y();
+    p.z.v[i] = t.p.z();
+    focus.x.v[i] = t.focus.x();
+    focus.y.v[i] = t.focus.y();
+    focus.z.v[i] = t.focus.z();
+    focus.w.v[i] = t.focus.w();
+  }
+  seen_lanes_.resize(candidates_.size());
+  penalties_.resize(candidates_.size());
+  weights_.resize(candidates_.size());
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    const FieldView& view = views_[candidate_views_[c]];
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const Eigen::Vector4f seen = fetch_cell(view, texel[i]);
+      seen_lanes_[c].x.v[i] = seen.x();
+      seen_lanes_[c].y.v[i] = seen.y();
+      seen_lanes_[c].z.v[i] = seen.z();
+      weights_[c].v[i] = seen.w();
+    }
+    distance_penalties(p, focus, view.centre_in_world, weights_[c], penalties_[c]);
+  }
+  weights_of(penalties_, weights_, k_, same_ray, confidence);
+  for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
+}
+
+// ---- near emitters ----
+
 bool TileResampler::near_emitter(int bx, int by) const {
   if (cell_.fine_parts.empty()) return false;
-  for (int y = 0; y < patch; ++y)
-    for (int x = 0; x < patch; ++x)
-      if (emitters_.concerns(
-              vertex_[static_cast<std::size_t>((by * block_vertices + y) * vertices_ + bx * block_vertices + x)].p,
-              cell_.direction, cell_.angle_rad))
+  for (int y = 0; y <= block_vertices; ++y)
+    for (int x = 0; x <= block_vertices; ++x)
+      if (emitters_.concerns(vertex(bx * block_vertices + x, by * block_vertices + y).p, cell_.direction,
+                             cell_.angle_rad))
         return true;
   return false;
 }
@@ -92,7 +285,7 @@ Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p, float
   Eigen::Vector4f on_emitter = Eigen::Vector4f::Zero(), beside = Eigen::Vector4f::Zero();
   float solid_angle = 0, all_beside = 0, unknown_beside = 0;
   for (const CellSample& part : cell_.fine_parts) {
-    const Eigen::Vector4f seen = emitters_.radiance(p, part.direction, part_angle, candidates_);
+    const Eigen::Vector4f seen = emitters_.radiance(p, part.direction, part_angle, candidate_views_);
     const Eigen::Vector4f weighted = part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
     solid_angle += part.solid_angle_sr;
     if (emitters_.unhidden(p, part.direction)) {
@@ -109,152 +302,23 @@ Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p, float
 }
 
 // Each part of the cell is blended by itself, at the block's vertices; texels are interpolated.
-void TileResampler::fill_near_emitter(int bx, int by, Eigen::Vector4f* tile) {
-  std::array<Eigen::Vector4f, patch * patch> mean;
+void TileResampler::blend_near_emitter(int bx, int by, Lanes3& colour, Lanes& confidence) {
+  Patch<Eigen::Vector4f> mean;
   const float part_angle = cell_.angle_rad / std::sqrt(static_cast<float>(cell_.fine_parts.size()));
-  for (std::size_t n = 0; n < mean.size(); ++n) {
-    const int x = static_cast<int>(n) % patch, y = static_cast<int>(n) / patch;
-    const Vertex& v =
-        vertex_[static_cast<std::size_t>((by * block_vertices + y) * vertices_ + bx * block_vertices + x)];
-    mean[n] = mean_near_emitter(v.p, part_angle);
+  for (std::size_t i = 0; i < mean.size(); ++i)
+    mean[i] = mean_near_emitter(vertex(bx * block_vertices + static_cast<int>(i % patch_side),
+                                       by * block_vertices + static_cast<int>(i / patch_side))
+                                    .p,
+                                part_angle);
+  Lanes4 sum;
+  interpolate(mean, sum);
+  confidence = sum.w;
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    const float inverse = sum.w.v[i] > 0 ? 1 / sum.w.v[i] : 0;
+    colour.x.v[i] = sum.x.v[i] * inverse;
+    colour.y.v[i] = sum.y.v[i] * inverse;
+    colour.z.v[i] = sum.z.v[i] * inverse;
   }
-  const int size = field_.resolution;
-  for (int y = by * block_step; y < std::min(size, (by + 1) * block_step); ++y)
-    for (int x = bx * block_step; x < std::min(size, (bx + 1) * block_step); ++x) {
-      const float u = (static_cast<float>(x - bx * block_step) + 0.5F) / vertex_step;
-      const float v = (static_cast<float>(y - by * block_step) + 0.5F) / vertex_step;
-      const int i = static_cast<int>(u), j = static_cast<int>(v);
-      const float fu = u - static_cast<float>(i), fv = v - static_cast<float>(j);
-      const Eigen::Vector4f* at = &mean[static_cast<std::size_t>(j * patch + i)];
-      const Eigen::Vector4f sum =
-          (at[0] * (1 - fu) + at[1] * fu) * (1 - fv) + (at[patch] * (1 - fu) + at[patch + 1] * fu) * fv;
-      Eigen::Vector4f& texel = tile[y * size + x];
-      texel = Eigen::Vector4f::Zero();
-      if (sum.w() > 0) texel << sum.head<3>() / sum.w(), sum.w();
-    }
-}
-
-// World point of a texel position (texel centres at +0.5; row 0 at max y).
-Eigen::Vector3f TileResampler::point(float texel_x, float texel_y) const {
-  const double n = field_.resolution;
-  const Eigen::Vector2d size = field_.plane.size_m();
-  const Eigen::Vector3d p(field_.plane.min_m.x() + static_cast<double>(texel_x) / n * size.x(),
-                          field_.plane.max_m.y() - static_cast<double>(texel_y) / n * size.y(), 0);
-  return (field_.plane.world_from_plane * p).cast<float>();
-}
-
-ProxyPoint TileResampler::focus(const Eigen::Vector3f& p) const {
-  if (field_.surroundings.is_plane()) return p.homogeneous();
-  return proxy_point(p, cell_.direction, field_.surroundings.inverse_distance_along(p, cell_.direction));
-}
-
-// Plane as proxy: the angle between the wanted and the captured ray. Else: how far the captured ray passes by.
-float TileResampler::penalty(const FieldView& view, const Eigen::Vector3f& p, const ProxyPoint& x) const {
-  if (!field_.surroundings.is_plane()) return ray_distance(p, x, view.centre_in_world);
-  const Eigen::Vector3f ray = ray_to(x, view.centre_in_world);
-  return std::atan2(ray.cross(cell_.direction).norm(), ray.dot(cell_.direction));
-}
-
-void TileResampler::rank_views(int corner_x, int corner_y) {
-  const Vertex& v =
-      vertex_[static_cast<std::size_t>(corner_y * block_vertices * vertices_ + corner_x * block_vertices)];
-  ranked_.clear();
-  for (std::uint32_t i = 0; i < views_.size(); ++i) {
-    const Eigen::Vector3f pixel = pixel_of(views_[i], v.focus);
-    if (pixel.z() <= 0) continue;
-    const int level = field_.surroundings.is_plane() ? 0 : level_for_angle(views_[i], v.focus, cell_.angle_rad);
-    const float weight = views_[i].fetch(level, pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
-    if (weight >= smallest_weight) ranked_.push_back({i, penalty(views_[i], v.p, v.focus) / weight});
-  }
-  const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
-  const std::size_t kept = std::min(static_cast<std::size_t>(k_) + spare, ranked_.size());
-  std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(kept), ranked_.end(),
-                    [](const ViewPenalty& a, const ViewPenalty& b) { return a.penalty < b.penalty; });
-  auto& best = best_views_[static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x)];
-  best.clear();
-  for (std::size_t i = 0; i < kept; ++i) best.push_back(ranked_[i].view);
-}
-
-// The views that any corner of a block ranked among its best, each once.
-void TileResampler::gather_candidates(int bx, int by) {
-  ++block_count_;
-  block_x_ = bx;
-  block_y_ = by;
-  candidates_.clear();
-  for (int corner = 0; corner < 4; ++corner)
-    for (const std::uint32_t v :
-         best_views_[static_cast<std::size_t>((by + corner / 2) * (blocks_ + 1) + bx + corner % 2)]) {
-      if (mark_[v] == block_count_) continue;
-      mark_[v] = block_count_;
-      candidates_.push_back(v);
-    }
-}
-
-void TileResampler::fetch_candidates(int bx, int by) {
-  seen_.resize(candidates_.size() * patch * patch);
-  seen_here_.resize(candidates_.size());
-  std::size_t n = 0;
-  for (const std::uint32_t view : candidates_)
-    for (int y = 0; y < patch; ++y)
-      for (int x = 0; x < patch; ++x)
-        seen_[n++] = fetch_cell(
-            views_[view],
-            vertex_[static_cast<std::size_t>((by * block_vertices + y) * vertices_ + bx * block_vertices + x)]);
-}
-
-// Mean over the cell of what one view saw of it: premultiplied colour and weight.
-Eigen::Vector4f TileResampler::fetch_cell(const FieldView& view, const Vertex& v) const {
-  if (field_.surroundings.is_plane()) {
-    const Eigen::Vector3f pixel = pixel_of(view, v.focus);
-    if (pixel.z() <= 0) return Eigen::Vector4f::Zero();
-    // The paper's fetch has no cell to average: a point of the plane is one pixel of the view. A texel's size serves.
-    const float texel_m = static_cast<float>(field_.plane.size_m().maxCoeff()) / static_cast<float>(field_.resolution);
-    return view.fetch(level_for_angle(view, v.focus, texel_m), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-  }
-  const int level = level_for_angle(view, v.focus, cell_.part_angle_rad);
-  const Eigen::Matrix3f turn = view.pixel_from_world.leftCols<3>();
-  const Eigen::Vector3f base = v.focus.w() * (turn * v.p + view.pixel_from_world.col(3));
-  Eigen::Vector4f sum = Eigen::Vector4f::Zero();
-  float solid_angle = 0;
-  for (const CellSample& part : cell_.parts) {
-    const Eigen::Vector3f pixel = base + turn * part.direction;
-    solid_angle += part.solid_angle_sr;
-    if (pixel.z() > 0) sum += part.solid_angle_sr * view.fetch(level, pixel.x() / pixel.z(), pixel.y() / pixel.z());
-  }
-  return sum / solid_angle;
-}
-
-Eigen::Vector4f TileResampler::blend(int x, int y) {
-  // Where the texel's centre lies in the block's patch of vertices.
-  const float u = (static_cast<float>(x - block_x_ * block_step) + 0.5F) / vertex_step;
-  const float v = (static_cast<float>(y - block_y_ * block_step) + 0.5F) / vertex_step;
-  const int i = static_cast<int>(u), j = static_cast<int>(v);
-  const float fu = u - static_cast<float>(i), fv = v - static_cast<float>(j);
-  const Vertex* corner =
-      &vertex_[static_cast<std::size_t>((block_y_ * block_vertices + j) * vertices_ + block_x_ * block_vertices + i)];
-  const auto interpolate = [&](const auto& a, const auto& b, const auto& c, const auto& d) {
-    return ((a * (1 - fu) + b * fu) * (1 - fv) + (c * (1 - fu) + d * fu) * fv).eval();
-  };
-  const Eigen::Vector3f p = interpolate(corner[0].p, corner[1].p, corner[vertices_].p, corner[vertices_ + 1].p);
-  const ProxyPoint x_focus =
-      interpolate(corner[0].focus, corner[1].focus, corner[vertices_].focus, corner[vertices_ + 1].focus);
-  ranked_.clear();
-  for (std::uint32_t c = 0; c < candidates_.size(); ++c) {
-    const Eigen::Vector4f* at = &seen_[c * patch * patch + static_cast<std::size_t>(j * patch + i)];
-    seen_here_[c] = interpolate(at[0], at[1], at[patch], at[patch + 1]);
-    // The penalty over the field-of-view weight: it grows without bound towards the view's border.
-    if (seen_here_[c].w() >= smallest_weight)
-      ranked_.push_back({c, penalty(views_[candidates_[c]], p, x_focus) / seen_here_[c].w()});
-  }
-  const std::size_t speaking = blend_weights(ranked_, k_, same_ray, weights_);
-  Eigen::Vector4f colour = Eigen::Vector4f::Zero();
-  float confidence = 0;
-  for (std::size_t s = 0; s < speaking; ++s) {
-    const Eigen::Vector4f& seen = seen_here_[weights_[s].view];
-    colour += weights_[s].weight / seen.w() * seen;
-    confidence += seen.w();
-  }
-  return {colour.x(), colour.y(), colour.z(), std::min(1.0F, confidence)};
 }
 
 }  // namespace mf

@@ -6,20 +6,22 @@
 #include <optional>
 #include <vector>
 
-#include "host/blending/view_weights.h"
+#include "host/light_field/block_blend.h"
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/rectified_views.h"
+#include "host/light_field/view_ranking.h"
 #include "host/light_field/view_rays.h"
 
 namespace mf {
 
-// Fills a light field's tiles, one direction at a time.
+// Fills a light field's tiles, one direction at a time; for any proxy but the plane (plane_tiles.h).
 //
 // What varies slowly over the plane is computed on a sparse grid of vertices and interpolated (Buehler's blending
-// field): which views could speak for a ray is decided at every second vertex by ranking all of them; what a view saw
-// of the direction's cell is fetched at every vertex. The penalties, and so the weights, are exact at every texel. One
-// resampler a thread: it holds the working memory.
+// field): which views could speak for a ray is decided at every second vertex by ranking all that look that way; what a
+// view saw of the direction's cell is fetched at every vertex. The penalties, and so the weights, are exact at every
+// texel. Where the proxy's distance jumps nothing is interpolated. One resampler a thread: it holds the working memory.
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
@@ -41,39 +43,58 @@ class TileResampler {
     Eigen::Vector3f p;  // world
     ProxyPoint focus;
   };
+  // The views that may see some of what the direction's rays meet.
+  struct Lookers {
+    std::vector<std::uint32_t> views;
+    std::vector<float> centre_x, centre_y, centre_z;
+  };
+  struct Seen {
+    Eigen::Vector4f colour;  // premultiplied; weight
+    std::uint32_t stamp = 0;
+  };
 
   void prepare(std::size_t direction);
-  void rank_views(int vertex_x, int vertex_y);
+  void find_lookers();
+  void rank_views(int corner_x, int corner_y);
   void gather_candidates(int block_x, int block_y);
-  void fetch_candidates(int block_x, int block_y);
-  [[nodiscard]] Eigen::Vector4f blend(int x, int y);
+  void blend(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
+  [[nodiscard]] bool is_rough(int block_x, int block_y) const;
+  void blend_rough(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
+  [[nodiscard]] const Eigen::Vector4f& seen_at(std::size_t looker, int vertex_x, int vertex_y);
+  [[nodiscard]] Eigen::Vector4f fetch_cell(const FieldView&, const Vertex&) const;
+
   [[nodiscard]] bool near_emitter(int block_x, int block_y) const;
   [[nodiscard]] Eigen::Vector4f mean_near_emitter(const Eigen::Vector3f& p, float part_angle) const;
-  void fill_near_emitter(int block_x, int block_y, Eigen::Vector4f* tile);
+  void blend_near_emitter(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
 
-  [[nodiscard]] Eigen::Vector3f point(float texel_x, float texel_y) const;
-  [[nodiscard]] ProxyPoint focus(const Eigen::Vector3f& p) const;
-  [[nodiscard]] float penalty(const FieldView&, const Eigen::Vector3f& p, const ProxyPoint&) const;
-  [[nodiscard]] Eigen::Vector4f fetch_cell(const FieldView&, const Vertex&) const;
+  [[nodiscard]] const Vertex& vertex(int x, int y) const {
+    return vertex_[static_cast<std::size_t>(y * vertices_ + x)];
+  }
 
   const std::vector<FieldView>& views_;
   const LightField& field_;
   const EmitterBlender& emitters_;
+  TexelGrid grid_;
   int k_;
   int blocks_;    // along a side
   int vertices_;  // along a side
 
   Cell cell_;
   std::vector<Vertex> vertex_;
-  std::vector<std::vector<std::uint32_t>> best_views_;  // by block corner
-  std::vector<std::uint32_t> candidates_;               // views, of the block at hand
-  std::vector<Eigen::Vector4f> seen_;                   // by candidate, then vertex of the block: premultiplied
-  std::vector<std::uint32_t> mark_;                     // by view: the block that listed it last
+  Lookers lookers_;
+  std::vector<float> bounds_;
+  LeastPenalties ranking_;
+  std::vector<std::vector<std::uint32_t>> best_lookers_;  // by block corner
+  std::vector<float> reach_m_;                            // by block corner: how far the farthest of them pass
+  std::vector<std::uint32_t> candidates_;                 // lookers, of the block at hand
+  std::vector<std::uint32_t> candidate_views_;            // the same, as views
+  std::vector<std::uint32_t> mark_;                       // by looker: the block that listed it last
   std::uint32_t block_count_ = 0;
-  std::vector<ViewPenalty> ranked_;
-  std::vector<ViewWeight> weights_;
-  std::vector<Eigen::Vector4f> seen_here_;  // by candidate, at the texel at hand
-  int block_x_ = 0, block_y_ = 0;
+  std::vector<Seen> seen_;  // by looker, then three rows of vertices: blocks share their edges
+  std::uint32_t row_count_ = 0;
+  std::vector<Patch<Eigen::Vector4f>> patches_;  // by candidate
+  std::vector<Lanes3> seen_lanes_;               // by candidate, in rough blocks
+  std::vector<Lanes> penalties_, weights_;
 };
 
 }  // namespace mf

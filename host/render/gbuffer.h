@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/render/ray_scene.h"
+#include "host/tracing/ray_scene.h"
 #include "host/render/surface_point.h"
-#include "host/render/view.h"
+#include "host/io/view.h"
 
 namespace mf {
 

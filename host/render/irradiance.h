@@ -7,7 +7,7 @@
 
 #include "common/progress.h"
 #include "host/render/light_set.h"
-#include "host/render/ray_scene.h"
+#include "host/tracing/ray_scene.h"
 #include "host/render/surface_point.h"
 
 namespace mf {

@@ -22,16 +22,16 @@ struct GlslLight {
   std::array<float, 4> shadow_v;
   std::array<float, 4> shadow_depth;
   std::array<float, 4> image;
+  std::array<float, 4> plane;
 };
 struct GlslLightBlock {
   std::array<GlslLight, max_lights> lights;
-  std::array<float, 4> plane;
   std::array<int, 4> count;
 };
 static_assert(offsetof(GlslLight, shadow_u) == 16 && offsetof(GlslLight, shadow_v) == 32 &&
-              offsetof(GlslLight, shadow_depth) == 48 && offsetof(GlslLight, image) == 64 && sizeof(GlslLight) == 80);
-static_assert(offsetof(GlslLightBlock, plane) == 80 * max_lights &&
-              offsetof(GlslLightBlock, count) == 80 * max_lights + 16);
+              offsetof(GlslLight, shadow_depth) == 48 && offsetof(GlslLight, image) == 64 &&
+              offsetof(GlslLight, plane) == 80 && sizeof(GlslLight) == 96);
+static_assert(offsetof(GlslLightBlock, count) == 96 * max_lights);
 
 // The coordinate (dot(axis, x) − low) / (high − low) over the corners of a box.
 struct Extent {
@@ -50,26 +50,28 @@ struct Extent {
   }
 };
 
-GlslLight make_light(const DirectionalLight& light, const Bounds& box, int shadow_map_size) {
+GlslLight make_light(const DirectionalLight& light, const PlaneImage& image, const Bounds& box, int shadow_map_size) {
   const Eigen::Vector3f& w = light.direction;
   const Eigen::Vector3f axis_u = w.unitOrthogonal();
   const Extent u(axis_u, box), v(w.cross(axis_u), box);
   const Extent depth(-w, box);  // grows away from the light
   const float texel = std::max(u.size, v.size) / static_cast<float>(shadow_map_size);
+  const Eigen::Vector2f size = image.max_m - image.min_m;
   return {{w.x(), w.y(), w.z(), light.solid_angle_sr},
           u.coordinate(),
           v.coordinate(),
           depth.coordinate(),
-          {0, texel, 0, 0}};
+          {0, texel, 0, 0},
+          {image.min_m.x(), image.max_m.y(), 1 / size.x(), 1 / size.y()}};
 }
 
-// Lights of one image size and rectangle, at most max_lights.
+// Lights whose images have one size in texels, at most max_lights.
 struct Batch {
   std::span<const DirectionalLight> lights;
 };
 
-bool same_layout(const PlaneImage& a, const PlaneImage& b) {
-  return a.width == b.width && a.height == b.height && a.min_m == b.min_m && a.max_m == b.max_m;
+bool same_size(const PlaneImage& a, const PlaneImage& b) {
+  return a.width == b.width && a.height == b.height;
 }
 
 std::vector<Batch> make_batches(const LightSet& set) {
@@ -78,7 +80,7 @@ std::vector<Batch> make_batches(const LightSet& set) {
   for (std::size_t first = 0; first < all.size();) {
     std::size_t end = first + 1;
     while (end < all.size() && end - first < max_lights &&
-           same_layout(set.images[all[first].image], set.images[all[end].image]))
+           same_size(set.images[all[first].image], set.images[all[end].image]))
       ++end;
     batches.push_back({all.subspan(first, end - first)});
     first = end;
@@ -156,18 +158,15 @@ void GlIrradiance::Impl::make_shadow_maps() {
 
 void GlIrradiance::Impl::upload_batch(const Batch& batch, const LightSet& set, const GlTexture& tiles) {
   GlslLightBlock block{};
-  const PlaneImage& layout = set.images[batch.lights.front().image];
-  const Eigen::Vector2f size = layout.max_m - layout.min_m;
-  block.plane = {layout.min_m.x(), layout.max_m.y(), 1 / size.x(), 1 / size.y()};
   block.count = {static_cast<int>(batch.lights.size()), 0, 0, 0};
   glActiveTexture(GL_TEXTURE4);
   glBindTexture(GL_TEXTURE_2D_ARRAY, tiles.name());
   int layer = -1;
   for (std::size_t i = 0; i < batch.lights.size(); ++i) {
-    block.lights[i] = make_light(batch.lights[i], bounds, options.shadow_map_size);
+    const PlaneImage& image = set.images[batch.lights[i].image];
+    block.lights[i] = make_light(batch.lights[i], image, bounds, options.shadow_map_size);
     if (i == 0 || batch.lights[i].image != batch.lights[i - 1].image) {  // points of one cell follow each other
       ++layer;
-      const PlaneImage& image = set.images[batch.lights[i].image];
       glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, layer, image.width, image.height, 1, GL_RGBA, GL_FLOAT,
                       image.texels->data());
     }

@@ -8,7 +8,7 @@
 #include "common/progress.h"
 #include "host/gl/egl_context.h"
 #include "host/render/irradiance.h"
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 namespace mf {
 

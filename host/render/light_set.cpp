@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/render/light_set.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "common/check.h"
 
@@ -14,34 +15,30 @@ namespace {
 
 constexpr double golden_angle = 2.399963229728653;  // π (3 − √5)
 
-float luminance(const Eigen::Vector4f& rgb) {
-  return 0.2126F * rgb[0] + 0.7152F * rgb[1] + 0.0722F * rgb[2];
-}
-
-// Mean over the tile of the light that each cell brings, any unit.
-std::vector<double> cell_power(const LightField& field) {
-  std::vector<double> power(field.directions.size());
-  for (std::size_t i = 0; i < power.size(); ++i) {
-    const Eigen::Vector4f* tile = field.tile(i);
-    double sum = 0;
-    for (std::size_t t = 0; t < field.texel_count(); ++t) sum += luminance(tile[t]);
-    power[i] = std::max(0., sum) * field.directions.solid_angles_sr[i];
-  }
-  return power;
-}
-
-// How often to halve the fan of a cell's triangles (see split_cell), or −1: not at all.
-std::vector<int> splits_per_cell(const LightField& field, const ImportanceOptions& options) {
+// How often to halve the fan of each group's triangles (see split_cell), or −1: not at all.
+std::vector<int> splits_by_group(std::span<const CellGroup> groups, const ImportanceOptions& options) {
   constexpr double fan = 6;  // triangles of a usual cell
-  const std::vector<double> power = cell_power(field);
-  const double total = std::accumulate(power.begin(), power.end(), 0.);
-  std::vector<int> splits(power.size(), -1);
-  if (!(total > 0)) return splits;
-  for (std::size_t i = 0; i < power.size(); ++i) {
-    const double parts = std::min<double>(options.extra_directions * power[i] / total, options.most_per_cell);
+  double total = 0;
+  for (const CellGroup& group : groups) total += group.light;
+  std::vector<int> splits(groups.size(), -1);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (groups[i].cells.size() > 1) continue;  // wide, and dim for that
+    const double parts = std::min<double>(options.extra_directions * groups[i].light / total, options.most_per_cell);
     if (parts >= 2) splits[i] = std::max(0, static_cast<int>(std::lround(std::log2(parts / fan))));
   }
   return splits;
+}
+
+// The light of each image for the plane: Σ ω_z ΔΩ over the lights that show it.
+std::vector<float> weights_on_plane(const LightSet& set) {
+  std::vector<float> weights(set.images.size(), 0);
+  for (const DirectionalLight& light : set.lights)
+    weights[light.image] += std::max(0.F, light.direction.z()) * light.solid_angle_sr;
+  return weights;
+}
+
+bool same_grid(const PlaneImage& a, const PlaneImage& b) {
+  return a.width == b.width && a.height == b.height && a.min_m == b.min_m && a.max_m == b.max_m;
 }
 
 }  // namespace
@@ -52,56 +49,49 @@ std::optional<std::string> ImportanceOptions::validate() const {
   return std::nullopt;
 }
 
-LightSet make_light_set(const LightField& field, const ImportanceOptions& options) {
-  check(!options.validate(), "valid importance options");
+LightSet make_light_set(const DirectionSet& directions, std::span<const CellGroup> groups,
+                        std::vector<PlaneImage> images, const ImportanceOptions& options) {
+  check(!options.validate() && images.size() == groups.size(), "valid importance options, and an image for each group");
   LightSet set;
-  const Eigen::Vector2f min = field.plane.min_m.cast<float>();
-  const Eigen::Vector2f max = field.plane.max_m.cast<float>();
-  const std::vector<int> splits = splits_per_cell(field, options);
-  for (std::size_t i = 0; i < field.directions.size(); ++i) {
+  set.images = std::move(images);
+  const std::vector<int> splits = splits_by_group(groups, options);
+  for (std::size_t i = 0; i < groups.size(); ++i) {
     const auto image = static_cast<std::uint32_t>(i);
-    set.images.push_back({min, max, field.resolution, field.resolution, field.tile(i)});
     if (splits[i] < 0) {
-      set.lights.push_back({field.directions.directions[i], field.directions.solid_angles_sr[i], image});
+      set.lights.push_back({groups[i].direction, groups[i].solid_angle_sr, image});
       continue;
     }
-    for (const CellSample& part : split_cell(field.directions, i, splits[i]))
+    for (const CellSample& part : split_cell(directions, groups[i].cells.front(), splits[i]))
       set.lights.push_back({part.direction, part.solid_angle_sr, image});
   }
   return set;
 }
 
-LightField coarsened(const LightField& field, int directions) {
-  const DirectionSet coarse = geodesic_hemisphere(directions);
-  if (coarse.size() >= field.directions.size()) return field;
-  const DirectionLocator locator(coarse);
-  const std::vector<double> power = cell_power(field);
-  LightField result;
-  result.plane = field.plane;
-  result.surroundings = field.surroundings;
-  result.resolution = field.resolution;
-  result.directions.directions.assign(coarse.size(), Eigen::Vector3f::Zero());
-  result.directions.solid_angles_sr.assign(coarse.size(), 0);
-  result.rgbc.assign(coarse.size() * field.texel_count(), Eigen::Vector4f::Zero());
-  for (std::size_t i = 0; i < field.directions.size(); ++i) {
-    const Eigen::Vector3f& d = field.directions.directions[i];
-    const DirectionWeights w = locator.locate(d);
-    const auto nearest = std::max_element(w.weight.begin(), w.weight.end()) - w.weight.begin();
-    const std::uint32_t to = w.index[static_cast<std::size_t>(nearest)];
-    const float solid_angle = field.directions.solid_angles_sr[i];
-    // A trace of the solid angle gives a cell without light a direction too.
-    result.directions.directions[to] += (static_cast<float>(power[i]) + 1e-6F * solid_angle) * d;
-    result.directions.solid_angles_sr[to] += solid_angle;
-    for (std::size_t t = 0; t < field.texel_count(); ++t) result.tile(to)[t] += solid_angle * field.tile(i)[t];
-  }
-  for (std::size_t i = 0; i < coarse.size(); ++i) {
-    const float solid_angle = result.directions.solid_angles_sr[i];
-    Eigen::Vector3f& d = result.directions.directions[i];
-    d = solid_angle > 0 ? d.normalized() : coarse.directions[i];
-    if (solid_angle > 0)
-      for (std::size_t t = 0; t < field.texel_count(); ++t) result.tile(i)[t] /= solid_angle;
-  }
-  return result;
+LightSet make_light_set(const LightField& field, const ImportanceOptions& options) {
+  std::vector<PlaneImage> images = images_of(field);
+  const std::vector<double> light = light_of_tiles(field.directions, images);
+  const auto all = static_cast<int>(field.directions.size());
+  return make_light_set(field.directions, group_cells(field.directions, light, all), std::move(images), options);
+}
+
+PlaneTile bare_irradiance(const LightSet& set) {
+  const auto largest = std::max_element(set.images.begin(), set.images.end(),
+                                        [](const auto& a, const auto& b) { return a.texel_count() < b.texel_count(); });
+  if (largest == set.images.end()) return {};
+  PlaneTile sum{largest->min_m, largest->max_m, largest->width, largest->height, {}};
+  sum.texels.assign(largest->texel_count(), Eigen::Vector4f::Zero());
+  const std::vector<float> weights = weights_on_plane(set);
+  tbb::parallel_for(0, sum.height, [&](int y) {
+    Eigen::Vector4f* row = sum.texels.data() + static_cast<std::ptrdiff_t>(y) * sum.width;
+    for (std::size_t i = 0; i < set.images.size(); ++i) {
+      const PlaneImage& image = set.images[i];
+      const bool same = same_grid(image, *largest);
+      const Eigen::Vector4f* same_row = image.texels + static_cast<std::ptrdiff_t>(y) * sum.width;
+      for (int x = 0; x < sum.width; ++x)
+        row[x] += weights[i] * (same ? same_row[x] : sample(image, sum.position(x, y)));
+    }
+  });
+  return sum;
 }
 
 void append_ground_light(LightSet& set, const PlaneImage& outgoing_radiance, int count) {
@@ -115,23 +105,6 @@ void append_ground_light(LightSet& set, const PlaneImage& outgoing_radiance, int
     const auto angle = static_cast<float>(k * golden_angle);
     set.lights.push_back({{r * std::cos(angle), r * std::sin(angle), z}, solid_angle, image});
   }
-}
-
-Eigen::Vector4f sample(const PlaneImage& image, const Eigen::Vector2f& p) {
-  const auto coordinate = [](float fraction, int size) {
-    return std::clamp(fraction * static_cast<float>(size) - 0.5F, 0.F, static_cast<float>(size - 1));
-  };
-  const Eigen::Vector2f size = image.max_m - image.min_m;
-  const float x = coordinate((p.x() - image.min_m.x()) / size.x(), image.width);
-  const float y = coordinate((image.max_m.y() - p.y()) / size.y(), image.height);
-  const int x0 = std::min(static_cast<int>(x), std::max(0, image.width - 2));
-  const int y0 = std::min(static_cast<int>(y), std::max(0, image.height - 2));
-  const float fx = x - static_cast<float>(x0);
-  const float fy = y - static_cast<float>(y0);
-  const int step = image.width > 1 ? 1 : 0;
-  const Eigen::Vector4f* row = image.texels + static_cast<std::ptrdiff_t>(y0) * image.width + x0;
-  const Eigen::Vector4f* below = row + (image.height > 1 ? image.width : 0);
-  return (1 - fy) * ((1 - fx) * row[0] + fx * row[step]) + fy * ((1 - fx) * below[0] + fx * below[step]);
 }
 
 }  // namespace mf

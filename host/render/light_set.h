@@ -8,20 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "common/image.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/light_tiles.h"
+#include "host/render/importance.h"
 
 namespace mf {
-
-// Radiance by position on the plane z = 0: cell-centred texels over a rectangle, row 0 at max y. Red, green, blue and
-// one unused. Bilinear; beyond the rectangle the rim's value holds on. The texels belong to somebody else.
-struct PlaneImage {
-  Eigen::Vector2f min_m = Eigen::Vector2f::Zero();
-  Eigen::Vector2f max_m = Eigen::Vector2f::Zero();
-  int width = 0;
-  int height = 0;
-  const Eigen::Vector4f* texels = nullptr;
-};
 
 // Parallel light: at x it brings the radiance image(p) from `direction` (unit length, towards the light), where p is
 // the point in which the line through x along the direction crosses the plane:
@@ -51,18 +42,20 @@ struct ImportanceOptions {
   [[nodiscard]] std::optional<std::string> validate() const;
 };
 
-// The light field as parallel lights, brightest cells refined. Both back ends sum over this same set. It refers to the
-// texels of the field, which must outlive it. Energy is kept: the solid angles of a cell's points sum to the cell's.
+// Groups of cells as parallel lights, each with its image; groups of one bright cell are refined. Both back ends sum
+// over this same set. It refers to the images' texels, which must outlive it. Energy is kept: the solid angles of a
+// cell's points sum to the cell's. Precondition: an image for each group.
+[[nodiscard]] LightSet make_light_set(const DirectionSet&, std::span<const CellGroup>, std::vector<PlaneImage> images,
+                                      const ImportanceOptions&);
+
+// A whole light field, every cell a group, by the light that its tiles hold.
 [[nodiscard]] LightSet make_light_set(const LightField&, const ImportanceOptions&);
 
-// The same light from about `directions` directions only: cells merged with their neighbours, energy kept, each merged
-// cell in the direction that its light mostly comes from. For what varies slowly.
-[[nodiscard]] LightField coarsened(const LightField&, int directions);
+// Irradiance of the bare plane under the set, over the rectangle and as finely as the set's largest image:
+// E(p) = Σ image(p) ω_z ΔΩ. An empty set has none.
+[[nodiscard]] PlaneTile bare_irradiance(const LightSet&);
 
 // What a plane sends up, as parallel lights from below: `count` directions over the lower hemisphere, one image.
 void append_ground_light(LightSet&, const PlaneImage& outgoing_radiance, int count);
-
-// Bilinear lookup; see PlaneImage.
-[[nodiscard]] Eigen::Vector4f sample(const PlaneImage&, const Eigen::Vector2f& p);
 
 }  // namespace mf

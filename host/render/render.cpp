@@ -12,7 +12,7 @@ namespace mf {
 namespace {
 
 constexpr int ground_texels = 256;  // a side: 2 % of the object's radius each
-constexpr int bounce_lights = 320;  // what lights the object before the bounce, from above and as many from below
+constexpr int bounce_lights = 320;  // what lights the object from below before the bounce
 constexpr int bounce_texels = 96;   // light off the object is smoother than its shadow
 
 std::vector<SurfacePoint> points_of(const GroundRadiance& ground) {
@@ -24,23 +24,6 @@ std::vector<SurfacePoint> points_of(const GroundRadiance& ground) {
     }
   return points;
 }
-
-// Irradiance of the bare plane, to be looked up.
-struct PlaneIrradiance {
-  Eigen::Vector2f min_m, max_m;
-  int resolution;
-  std::vector<Eigen::Vector4f> texels;
-
-  explicit PlaneIrradiance(const LightField& field)
-      : min_m(field.plane.min_m.cast<float>()), max_m(field.plane.max_m.cast<float>()), resolution(field.resolution) {
-    const ImageF map = plane_irradiance(field);
-    for (std::size_t i = 0; i < map.data.size(); i += 3)
-      texels.emplace_back(map.data[i], map.data[i + 1], map.data[i + 2], 0.F);
-  }
-  [[nodiscard]] Eigen::Vector3f at(const Eigen::Vector3f& p) const {
-    return sample(PlaneImage{min_m, max_m, resolution, resolution, texels.data()}, p.head<2>()).head<3>();
-  }
-};
 
 // What the object's presence does to the ground's light, on a grid.
 struct GroundLight {
@@ -54,19 +37,19 @@ class Renderer {
       : input_(&input),
         options_(&options),
         progress_(&progress),
-        mesh_(transformed(input.field.plane.world_from_plane.inverse(), input.mesh_in_world)),
+        mesh_(transformed(input.light.plane.world_from_plane.inverse(), input.mesh_in_world)),
         scene_(mesh_),
-        illuminator_(options.backend, mesh_, scene_),
-        from_above_(make_light_set(input.field, options.importance)),
-        bare_(input.field) {}
+        illuminator_(options.backend, mesh_, scene_) {
+    check(!input.ground || !input.light.bare.texels.empty(), "a ground's own light");
+  }
 
   RenderResult run() {
     RenderResult result;
     result.backend = illuminator_.description();
-    const Rigid3 cam_from_plane = input_->view.cam_from_world * input_->field.plane.world_from_plane;
+    const Rigid3 cam_from_plane = input_->view.cam_from_world * input_->light.plane.world_from_plane;
     const GBuffer g = make_gbuffer(mesh_, scene_, input_->view.camera, cam_from_plane);
     const GroundLight ground = light_ground();
-    LightSet lights = from_above_;
+    LightSet lights = input_->light.from_above;
     if (input_->ground) append_ground_light(lights, ground.radiance.image(), options_->ground_directions);
     result.lights = lights.lights.size();
     result.fragments = g.points.size() + g.ground_points.size();
@@ -78,20 +61,23 @@ class Renderer {
  private:
   // The light that the mesh keeps from points of the plane.
   std::vector<Eigen::Vector3f> shadow(std::span<const SurfacePoint> points) {
-    return illuminator_.irradiance(points, from_above_, LightSum::blocked, *progress_);
+    return illuminator_.irradiance(points, input_->light.from_above, LightSum::blocked, *progress_);
   }
 
   GroundLight light_ground() {
     GroundLight light{ground_around(scene_.bounds(), ground_texels), ground_around(scene_.bounds(), bounce_texels)};
     if (mesh_.triangles.empty()) return light;
     const std::vector<SurfacePoint> points = points_of(light.radiance);
-    const std::vector<Eigen::Vector3f> blocked = shadow(points);
-    darken(light, points, blocked);
+    std::vector<Eigen::Vector3f> blocked;
+    if (input_->ground) {
+      blocked = shadow(points);
+      darken(light, points, blocked);
+    }
     if (options_->bounce_directions == 0) return light;
-    const LightField coarse = coarsened(input_->field, bounce_lights);
-    LightSet lights = make_light_set(coarse, {0, 1});
+    LightSet lights = input_->light.for_bounce;
     if (input_->ground) append_ground_light(lights, light.radiance.image(), bounce_lights);
     on_vertices_ = vertex_irradiance(mesh_, scene_, lights);
+    if (!input_->ground) return light;
     const std::vector<Eigen::Vector3f> bounced =
         gather_bounce(mesh_, scene_, on_vertices_, points_of(light.bounce), options_->bounce_directions);
     for (std::size_t i = 0; i < bounced.size(); ++i) light.bounce.texels[i].head<3>() = bounced[i];
@@ -102,10 +88,9 @@ class Renderer {
   // radiance = that of the bare ground · E_with / E_without
   void darken(GroundLight& light, const std::vector<SurfacePoint>& points,
               const std::vector<Eigen::Vector3f>& blocked) const {
-    if (!input_->ground) return;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Eigen::Vector2f p = points[i].position.head<2>();
-      const Eigen::Vector3f without = bare_.at(points[i].position);
+      const Eigen::Vector3f without = bare_at(p);
       const Eigen::Vector3f with = without - blocked[i] + sample(light.bounce.image(), p).head<3>();
       const Eigen::Vector3f bare = sample(input_->ground->image(), p).head<3>();
       for (int c = 0; c < 3; ++c)
@@ -139,10 +124,11 @@ class Renderer {
   void shade_ground(const GBuffer& g, const GroundLight& ground, RenderResult& result) {
     result.ground_without = ImageF(g.width, g.height, 3);
     result.ground_with = ImageF(g.width, g.height, 3);
+    if (!input_->ground) return;
     const std::vector<Eigen::Vector3f> blocked = shadow(g.ground_points);
     for (std::size_t i = 0; i < g.ground_points.size(); ++i) {
       const Eigen::Vector3f& p = g.ground_points[i].position;
-      const Eigen::Vector3f without = bare_.at(p);
+      const Eigen::Vector3f without = bare_at(p.head<2>());
       const Eigen::Vector3f with = without - blocked[i] + bounce_at(ground.bounce, p);
       for (int c = 0; c < 3; ++c) {
         const std::size_t at = 3 * static_cast<std::size_t>(g.ground_pixels[i]) + static_cast<std::size_t>(c);
@@ -150,6 +136,10 @@ class Renderer {
         result.ground_with.data[at] = std::max(0.F, with[c]);
       }
     }
+  }
+
+  [[nodiscard]] Eigen::Vector3f bare_at(const Eigen::Vector2f& p) const {
+    return sample(input_->light.bare.image(), p).head<3>();
   }
 
   // Beyond the grid the object's light is less than a thousandth of what it is beneath it: none.
@@ -165,8 +155,6 @@ class Renderer {
   TriangleMesh mesh_;  // plane frame
   RayScene scene_;
   Illuminator illuminator_;
-  LightSet from_above_;
-  PlaneIrradiance bare_;
   std::vector<Eigen::Vector3f> on_vertices_;  // direct irradiance; empty without a bounce
 };
 
@@ -176,7 +164,7 @@ std::optional<std::string> RenderOptions::validate() const {
   if (ground_directions < 16 || ground_directions > 100000) return "ground_directions must lie between 16 and 100000";
   if (bounce_directions != 0 && (bounce_directions < 16 || bounce_directions > 100000))
     return "bounce_directions must be 0 or lie between 16 and 100000";
-  return importance.validate();
+  return std::nullopt;
 }
 
 RenderResult render(const RenderInput& input, const RenderOptions& options, const Progress& progress) {
@@ -184,16 +172,13 @@ RenderResult render(const RenderInput& input, const RenderOptions& options, cons
   return Renderer(input, options, progress).run();
 }
 
-GroundRadiance diffuse_ground(const LightField& field, const TriangleMesh& mesh_in_world, double albedo) {
-  const TriangleMesh mesh = transformed(field.plane.world_from_plane.inverse(), mesh_in_world);
+GroundRadiance diffuse_ground(const IncidentLight& light, const TriangleMesh& mesh_in_world, double albedo) {
+  const TriangleMesh mesh = transformed(light.plane.world_from_plane.inverse(), mesh_in_world);
   GroundRadiance ground = ground_around(bounds_of(mesh), ground_texels);
-  const PlaneIrradiance bare(field);
   for (int y = 0; y < ground.height; ++y)
-    for (int x = 0; x < ground.width; ++x) {
-      const Eigen::Vector2f p = ground.position(x, y);
-      const Eigen::Vector3f radiance = static_cast<float>(albedo / std::numbers::pi) * bare.at({p.x(), p.y(), 0});
-      ground.texels[static_cast<std::size_t>(y * ground.width + x)].head<3>() = radiance;
-    }
+    for (int x = 0; x < ground.width; ++x)
+      ground.texels[static_cast<std::size_t>(y * ground.width + x)] =
+          static_cast<float>(albedo / std::numbers::pi) * sample(light.bare.image(), ground.position(x, y));
   return ground;
 }
 

@@ -6,16 +6,15 @@
 
 #include "common/image.h"
 #include "common/progress.h"
-#include "host/light_field/light_field.h"
+#include "host/io/view.h"
 #include "host/render/ground.h"
 #include "host/render/illuminator.h"
-#include "host/render/view.h"
+#include "host/render/incident_light.h"
 
 namespace mf {
 
 struct RenderOptions {
   Backend backend = Backend::automatic;
-  ImportanceOptions importance;
 
   // Directions in which the object sees the light that the ground sends up; more softens the pattern of a textured
   // ground on the object. 16 to 100000.
@@ -29,17 +28,18 @@ struct RenderOptions {
 };
 
 struct RenderInput {
-  const LightField& field;
+  const IncidentLight& light;
   const TriangleMesh& mesh_in_world;  // may be empty: the bare ground
   const View& view;
-  // What the ground sends up without the object, in the plane frame; nothing: a black ground.
+  // What the ground sends up without the object, in the plane frame; nothing: a black ground, of which no picture is
+  // made. Precondition: with a ground, light that was asked for with the plane.
   std::optional<GroundRadiance> ground;
 };
 
 // Linear pictures of the view's size.
 struct RenderResult {
   ImageF object;          // red, green, blue (radiance, times coverage) and coverage
-  ImageF ground_without;  // irradiance of the plane at each pixel, three channels; 0 where the pixel sees no plane
+  ImageF ground_without;  // irradiance of the plane at each pixel, three channels; 0 where the pixel sees no ground
   ImageF ground_with;     // the same with the object there: its shadow, and the light that it reflects
   std::string backend;    // which one did it
   std::size_t lights = 0;
@@ -55,7 +55,8 @@ struct RenderResult {
 // bounce, which varies slowly, is always traced on the CPU. Throws as Illuminator.
 [[nodiscard]] RenderResult render(const RenderInput&, const RenderOptions&, const Progress& = {});
 
-// A ground of one albedo around the object, lit by the field alone.
-[[nodiscard]] GroundRadiance diffuse_ground(const LightField&, const TriangleMesh& mesh_in_world, double albedo);
+// A ground of one albedo around the object, lit by the captured light alone. Precondition: it was asked for with the
+// plane.
+[[nodiscard]] GroundRadiance diffuse_ground(const IncidentLight&, const TriangleMesh& mesh_in_world, double albedo);
 
 }  // namespace mf

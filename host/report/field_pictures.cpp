@@ -55,16 +55,4 @@ double covered_share(const LightField& field) {
   return all > 0 ? covered / all : 0;
 }
 
-double display_exposure(const ImageF& picture) {
-  std::vector<float> lit;
-  for (std::size_t i = 0; i + 2 < picture.data.size(); i += 3) {
-    const float brightest = std::max({picture.data[i], picture.data[i + 1], picture.data[i + 2]});
-    if (brightest > 0) lit.push_back(brightest);
-  }
-  if (lit.empty()) return 1;
-  const auto at = lit.begin() + static_cast<std::ptrdiff_t>(0.97 * static_cast<double>(lit.size() - 1));
-  std::nth_element(lit.begin(), at, lit.end());
-  return 0.9 / static_cast<double>(*at);
-}
-
 }  // namespace mf

@@ -19,7 +19,4 @@ struct HemisphereDisc {
 // Share of the cosine-weighted hemisphere that views looked at, mean over the plane, 0 to 1.
 [[nodiscard]] double covered_share(const LightField&);
 
-// Exposure for to_srgb8() under which all but the brightest 3 % of the lit pixels keep their colour.
-[[nodiscard]] double display_exposure(const ImageF&);
-
 }  // namespace mf

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What each proxy is worth on the path-traced desk capture: one session, the same poses and response, the same errors
-// against truth; and both back ends on the same composite. The capture must lie beside the checkout.
+// against truth; both back ends on the same composite; and previews straight from the session. The capture must lie
+// beside the checkout.
 // `plane` is the baseline: the paper's way (Ihrke et al. 2008).
 #include <benchmark/benchmark.h>
 
 #include <chrono>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "host/io/exr.h"
@@ -34,6 +36,7 @@ class Desk {
              mirrorfield({"calibrate", session_}).exit_code == 0;
   }
   [[nodiscard]] bool ready() const { return ready_; }
+  [[nodiscard]] const std::string& session() const { return session_; }
 
   // Path of the field; empty on failure.
   [[nodiscard]] std::string field(const std::string& proxy) {
@@ -143,6 +146,82 @@ void backends(benchmark::State& state) {
   state.counters["rms_off_edges"] = relative_rms(gl, cpu, plate, 0.03);
 }
 BENCHMARK(backends)->Unit(benchmark::kSecond)->Iterations(1);
+
+// Relative RMS over the whole picture, alpha aside.
+double difference(const ImageF& a, const ImageF& b) {
+  double squares = 0, all = 0;
+  for (std::size_t i = 0; i < b.data.size(); ++i) {
+    if (i % static_cast<std::size_t>(b.channels) == 3) continue;
+    squares += std::pow(static_cast<double>(a.data[i] - b.data[i]), 2);
+    all += std::pow(static_cast<double>(b.data[i]), 2);
+  }
+  return std::sqrt(squares / all);
+}
+
+// A picture with `options`, and the seconds of its stages.
+struct Picture {
+  ImageF image;
+  nlohmann::json seconds;
+};
+Picture render_suzanne(const std::string& command, const std::string& light, std::vector<std::string> options) {
+  const fs::path truth = test::desk_folder() / "truth";
+  const test::TemporaryFolder folder;
+  const std::string file = folder / "picture.exr";
+  std::vector<std::string> arguments{command,
+                                     light,
+                                     truth / "suzanne.obj",
+                                     "--cameras",
+                                     truth / "views.json",
+                                     "--view",
+                                     "0",
+                                     "--albedo",
+                                     "0.7",
+                                     "--json",
+                                     "-o",
+                                     file};
+  if (command == "composite") options.insert(options.end(), {"--plate", truth / Desk::plate_name(0)});
+  arguments.insert(arguments.end(), options.begin(), options.end());
+  const nlohmann::json summary = nlohmann::json::parse(mirrorfield(arguments).out);
+  return {read_exr(file), summary.at("seconds_by_stage")};
+}
+
+// A preview of 200 directions straight from the session, beside the same through the light field's file. The median of
+// five pictures' seconds.
+void preview(benchmark::State& state, const std::string& command) {
+  if (!desk().ready()) return state.SkipWithError("the desk capture is absent");
+  constexpr std::size_t runs = 5;
+  const std::vector<std::string> few{"--directions", "200"};
+  std::map<std::string, std::vector<double>> seconds;
+  Picture straight, through_file, all;
+  double resample_s = 0;
+  for (auto _ : state) {
+    const auto start = std::chrono::steady_clock::now();
+    const std::string field = desk().field("auto");
+    resample_s = seconds_since(start);
+    through_file = render_suzanne(command, field, few);
+    all = render_suzanne(command, field, {});
+    for (std::size_t i = 0; i < runs; ++i) {
+      straight = render_suzanne(command, desk().session(), few);
+      for (const auto& [stage, s] : straight.seconds.items()) seconds[stage].push_back(s.get<double>());
+    }
+  }
+  for (auto& [stage, s] : seconds) {
+    std::sort(s.begin(), s.end());
+    state.counters[stage + "_s"] = s[runs / 2];
+  }
+  state.counters["preview_s"] = seconds["choosing"][runs / 2] + seconds["resampling"][runs / 2];
+  state.counters["resample_to_file_s"] = resample_s;  // 0 when it was there already
+  state.counters["read_and_merge_s"] =
+      through_file.seconds["reading"].get<double>() + through_file.seconds["merging"].get<double>();
+  state.counters["difference"] = difference(straight.image, through_file.image);
+  state.counters["of_200_from_all"] = difference(straight.image, all.image);
+  if (command == "composite") {
+    state.counters["psnr_preview"] = psnr_of_view(straight.image, 0);
+    state.counters["psnr_all"] = psnr_of_view(all.image, 0);
+  }
+}
+BENCHMARK_CAPTURE(preview, object, "render")->Unit(benchmark::kSecond)->Iterations(1);
+BENCHMARK_CAPTURE(preview, composite, "composite")->Unit(benchmark::kSecond)->Iterations(1);
 
 }  // namespace
 }  // namespace mf

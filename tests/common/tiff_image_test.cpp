@@ -71,6 +71,18 @@ TEST(Tiff, NoiseIsSmallerByWhatItsBitsAllow) {
   EXPECT_TRUE(same_pixels(black, decode_tiff(encode_tiff(black), "f.tif").pixels));
 }
 
+// Only the strips that hold wanted rows are decoded; those rows are what they are.
+TEST(Tiff, DecodesOnlyTheRowsThatAreWanted) {
+  ImageU16 image(512, 1024, 1);
+  for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<std::uint16_t>(1 + i % 4000);
+  const auto part = std::get<ImageU16>(decode_tiff(encode_tiff(image), "f.tif", {300, 420}).pixels);
+  ASSERT_EQ(part.height, image.height);
+  for (int y = 300; y < 420; ++y)
+    ASSERT_TRUE(std::equal(image.row(y).begin(), image.row(y).end(), part.row(y).begin())) << y;
+  EXPECT_EQ(part.at(5, 0), 0);
+  EXPECT_EQ(part.at(5, 1023), 0);
+}
+
 TEST(Tiff, EveryTruncationIsAnErrorThatNamesTheFile) {
   const std::string whole = encode_tiff(random_codes(64, 64, 1, 12));
   for (std::size_t size = 0; size < whole.size(); size += 97)

@@ -26,8 +26,9 @@ const Names vocabulary{"Eigen", "fmt", "JSON", "TOML"};
 const Names stage_libraries = vocabulary + Names{"TBB"};
 // The plain structs that stages hand forward.
 const Names records{"host/calibration/calibration.h", "host/light_field/light_field.h",
-                    "host/light_field/direction_set.h"};
-const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/"};
+                    "host/light_field/direction_set.h", "host/light_field/light_tiles.h"};
+const Names stage_headers =
+    Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/", "host/team/"};
 
 bool starts_with_any(std::string_view text, const Names& beginnings) {
   return std::any_of(beginnings.begin(), beginnings.end(), [&](std::string_view b) { return text.starts_with(b); });
@@ -86,6 +87,7 @@ const std::vector<Library>& known_libraries() {
       {"ISA-L", {"isa-l"}},
       {"PNG", {"png.h"}},
       {"zlib", {"zlib.h"}},
+      {"JPEG", {"jpeglib.h", "jerror.h"}},
       {"OpenEXR", {"OpenEXR/", "Imf", "Iex", "IlmThread"}},
       {"Imath", {"Imath/", "Imath", "half.h"}},
       {"AprilTag", {"apriltag/", "apriltag", "tag36h11.h"}},
@@ -95,6 +97,8 @@ const std::vector<Library>& known_libraries() {
       {"TBB", {"tbb/", "oneapi/tbb"}},
       {"assimp", {"assimp/"}},
       {"GL", {"epoxy/", "EGL/", "GLES", "GL/"}},
+      {"GLFW", {"GLFW/"}},
+      {"ImGui", {"imgui", "backends/imgui_impl"}},
       {"Aravis", {"arv.h", "aravis"}},
       {"V4L2", {"linux/videodev2.h", "linux/v4l2"}},
       {"libusb", {"libusb"}},
@@ -104,6 +108,7 @@ const std::vector<Library>& known_libraries() {
       {"systemd", {"systemd/"}},
       {"microhttpd", {"microhttpd.h"}},
       {"umockdev", {"umockdev.h"}},
+      {"MPI", {"mpi.h"}},
       {"GoogleTest", {"gtest/", "gmock/"}},
       {"benchmark", {"benchmark/"}},
       {"SIMD", {"immintrin.h", "xmmintrin.h", "x86intrin.h", "pmmintrin.h"}},
@@ -124,18 +129,26 @@ const std::vector<FolderRule>& include_table() {
       {"hw-sim/",
        {"common/", "device/"},
        vocabulary + Names{"Embree", "AprilTag", "PNG", "OpenEXR", "Imath", "umockdev", "V4L2", "libevdev", "usbfs"}},
-      {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "TIFF", "assimp"}},
+      {"host/io/", {"common/"}, stage_libraries + Names{"OpenEXR", "Imath", "PNG", "zlib", "JPEG", "TIFF", "assimp"}},
+      {"host/team/", {"common/"}, Names{"MPI"}},
       {"host/import/", {"common/", "host/io/"}, stage_libraries},
       {"host/gl/", {"common/"}, stage_libraries + Names{"GL"}},
       {"host/photometry/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/calibration/", {"common/", "host/io/"}, stage_libraries + Names{"Ceres"}},
       {"host/blending/", {"common/"}, stage_libraries},
+      {"host/tracing/", {"common/", "host/io/"}, stage_libraries + Names{"Embree"}},
       {"host/light_field/", stage_headers + Names{"host/calibration/calibration.h"},
        stage_libraries + Names{"OpenEXR", "Imath", "SIMD"}},
-      {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree", "assimp"}},
+      {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree"}},
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
+      {"host/lumigraph/", stage_headers + Names{"host/calibration/calibration.h"}, stage_libraries + Names{"GL", "Embree"}},
       {"host/report/", stage_headers + records, stage_libraries},
+      // It shows what two stages give, and lets a hand ask them for more.
+      {"host/viewer/",
+       stage_headers + records +
+           Names{"host/light_field/probe.h", "host/light_field/surroundings.h", "host/lumigraph/"},
+       stage_libraries + Names{"GL", "GLFW", "ImGui"}},
       {"host/cli/", {"common/", "host/"}, stage_libraries},
       {"tests/",
        {"common/", "device/", "host/", "hw-sim/"},

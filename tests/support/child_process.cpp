@@ -64,8 +64,12 @@ std::string ChildProcess::first_line() {
 }
 
 int ChildProcess::end() {
-  int status = 0;
   ::kill(pid_, SIGTERM);
+  return wait();
+}
+
+int ChildProcess::wait() {
+  int status = 0;
   ::waitpid(pid_, &status, 0);
   pid_ = -1;
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;

@@ -23,6 +23,9 @@ class ChildProcess {
   // SIGTERM, and its exit code (-1: by a signal).
   int end();
 
+  // Until it ends by itself, and its exit code (-1: by a signal).
+  int wait();
+
   [[nodiscard]] double cpu_seconds() const;
   [[nodiscard]] long resident_kb() const;
 

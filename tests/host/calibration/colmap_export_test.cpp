@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/mirror_picture.h"
 #include "common/virtual_view.h"
 #include "host/io/image_file.h"
 #include "tests/host/calibration/synthetic_views.h"

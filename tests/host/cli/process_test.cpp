@@ -49,22 +49,42 @@ double rms_where_changed(const ImageF& picture, const ImageF& truth, const Image
   return std::sqrt(sum / count);
 }
 
-TEST(Process, FromASimulatedRecordingToALitPicture) {
-  const test::TemporaryFolder folder;
-  const std::string capture = folder / "capture";
-  const std::string session = folder / "session";
-  const std::string out = folder / "out";
-  const std::string truth = capture + "/truth";
-  ASSERT_EQ(run_command({simulator, "capture", "-o", capture, "--frames", "50", "--size", "384", "--samples", "4",
-                         "--truth-samples", "16"})
-                .exit_code,
-            0);
-  ASSERT_EQ(run_command({mirrorfield, "import", capture, "-o", session}).exit_code, 0);
-  const CommandOutcome processed =
-      run_command({mirrorfield, "process", session, "-o", out, "--directions", "800", "--size", "48", "--json"});
-  ASSERT_EQ(processed.exit_code, 0) << processed.err;
+// A small simulated recording, processed: made once for the tests that look at different ends of it.
+struct Processed {
+  test::TemporaryFolder folder;
+  std::string capture = folder / "capture";
+  std::string session = folder / "session";
+  std::string out = folder / "out";
+  std::string truth = capture + "/truth";
+  CommandOutcome process;
 
-  const json summary = json::parse(processed.out);
+  Processed() {
+    for (const std::vector<std::string>& command :
+         {std::vector<std::string>{simulator, "capture", "-o", capture, "--frames", "50", "--size", "384", "--samples",
+                                   "4", "--truth-samples", "16"},
+          {mirrorfield, "import", capture, "-o", session},
+          {mirrorfield, "process", session, "-o", out, "--directions", "800", "--size", "48", "--json"}})
+      process = run_command(command);
+  }
+  // Of the commands that light the knot, seen by view 0.
+  [[nodiscard]] std::vector<std::string> lit(const std::string& command, const std::string& light,
+                                             std::vector<std::string> more) const {
+    std::vector<std::string> all{mirrorfield,           command,  light, truth + "/knot.obj", "--cameras",
+                                 truth + "/views.json", "--view", "0"};
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+};
+const Processed& processed() {
+  static const Processed made;
+  return made;
+}
+
+TEST(Process, FromASimulatedRecordingToALitPicture) {
+  const auto& [folder, capture, session, out, truth, process] = processed();
+  ASSERT_EQ(process.exit_code, 0) << process.err;
+
+  const json summary = json::parse(process.out);
   EXPECT_EQ(summary.at("frames"), 50);
   EXPECT_GE(summary.at("used").get<int>(), 40);
   EXPECT_LT(summary.at("rms_px").get<double>(), 0.35);
@@ -78,11 +98,11 @@ TEST(Process, FromASimulatedRecordingToALitPicture) {
   EXPECT_NE(page.find("</html>"), std::string::npos);
   EXPECT_EQ(read_exr(out + "/probe.exr").channels, 3);
 
-  ASSERT_EQ(run_command({mirrorfield, "composite", out + "/field.lf.exr", truth + "/knot.obj", "--plate",
-                         truth + "/plate0.exr", "--cameras", truth + "/views.json", "--view", "0", "--albedo", "0.7",
-                         "-o", out + "/composite.exr"})
-                .exit_code,
-            0);
+  ASSERT_EQ(
+      run_command(processed().lit("composite", out + "/field.lf.exr",
+                                  {"--plate", truth + "/plate0.exr", "--albedo", "0.7", "-o", out + "/composite.exr"}))
+          .exit_code,
+      0);
   const ImageF plate = blocks_of(read_exr(truth + "/plate0.exr"));
   const ImageF expected = blocks_of(read_exr(truth + "/knot0.exr"));
   const double ours = rms_where_changed(blocks_of(read_exr(out + "/composite.exr")), expected, plate);
@@ -90,6 +110,64 @@ TEST(Process, FromASimulatedRecordingToALitPicture) {
   RecordProperty("composite_rms", std::to_string(ours));
   RecordProperty("plate_rms", std::to_string(without));
   EXPECT_LT(ours, 0.35 * without) << "composite " << ours << ", bare plate " << without;
+}
+
+// Root mean square of the difference over that of the expected picture, alpha aside.
+double relative_rms(const ImageF& picture, const ImageF& expected) {
+  double difference = 0, all = 0;
+  for (std::size_t i = 0; i < expected.data.size(); ++i) {
+    if (i % static_cast<std::size_t>(expected.channels) == 3) continue;
+    difference += std::pow(static_cast<double>(picture.data[i] - expected.data[i]), 2);
+    all += std::pow(static_cast<double>(expected.data[i]), 2);
+  }
+  return std::sqrt(difference / all);
+}
+
+// Straight from the capture: the picture is that made through the light field's file.
+TEST(JustInTime, APreviewIsTheOneThroughTheFile) {
+  const Processed& p = processed();
+  ASSERT_EQ(p.process.exit_code, 0) << p.process.err;
+  const std::string field = p.out + "/default.lf.exr";
+  ASSERT_EQ(run_command({mirrorfield, "resample", p.session, "-o", field}).exit_code, 0);
+  for (const std::string command : {"render", "composite"}) {
+    const auto picture = [&](const std::string& light) {
+      std::string file = p.out + "/preview.exr";
+      std::vector<std::string> options{"--directions", "200", "--json", "-o", file};
+      if (command == "composite") options.insert(options.end(), {"--plate", p.truth + "/plate0.exr"});
+      const CommandOutcome outcome = run_command(p.lit(command, light, options));
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+      const json summary = json::parse(outcome.out);
+      EXPECT_TRUE(summary.at("seconds_by_stage").contains(light == p.session ? "resampling" : "merging"));
+      EXPECT_GE(summary.at("lights").get<int>(), 200);
+      return read_exr(file);
+    };
+    const double difference = relative_rms(picture(p.session), picture(field));
+    RecordProperty(command + "_difference", std::to_string(difference));
+    EXPECT_LT(difference, 0.01) << command;
+  }
+}
+
+TEST(JustInTime, SaysInOneLineWhatIsWrongWithASession) {
+  const Processed& p = processed();
+  ASSERT_EQ(p.process.exit_code, 0) << p.process.err;
+  const auto refuses = [&](const std::string& light, std::vector<std::string> options, const std::string& word) {
+    const std::string file = p.out + "/none.exr";
+    options.insert(options.end(), {"-o", file});
+    const CommandOutcome outcome = run_command(p.lit("render", light, options));
+    EXPECT_EQ(outcome.exit_code, 1) << word;
+    EXPECT_EQ(outcome.error_lines(), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(file)) << word;
+  };
+  refuses(p.truth, {}, "session.db");
+  refuses(p.session, {"--directions", "0"}, "--directions");
+  refuses(p.session, {"--proxy", "cube"}, "--proxy");
+  refuses(p.session, {"--height", "nan"}, "--height");
+  refuses(p.out + "/field.lf.exr", {"--proxy", "plane"}, "--proxy");
+  const std::string uncalibrated = p.folder / "uncalibrated";
+  ASSERT_EQ(run_command({mirrorfield, "import", p.capture, "-o", uncalibrated}).exit_code, 0);
+  fs::copy(p.session + "/response.json", uncalibrated);
+  refuses(uncalibrated, {}, "calibrate");
 }
 
 TEST(Process, SaysInOneLineWhatIsMissing) {

@@ -9,7 +9,7 @@
 
 #include "host/io/exr.h"
 #include "host/render/light_set.h"
-#include "host/render/view.h"
+#include "host/io/view.h"
 
 namespace mf::test {
 

@@ -111,5 +111,11 @@ TEST(ImageFile, DisplayEncodingIsSrgb) {
   EXPECT_EQ(to_srgb8(linear, 2).data, (std::vector<std::uint8_t>{0, 0, 3, 118, 255, 255}));
 }
 
+TEST(ImageFile, DisplayExposureIgnoresALamp) {
+  ImageF picture(100, 100, 3, 0.5F);
+  for (int x = 0; x < 20; ++x) picture.at(x, 0) = 4000;
+  EXPECT_NEAR(display_exposure(picture), 0.9 / 0.5, 1e-6);
+}
+
 }  // namespace
 }  // namespace mf

@@ -27,7 +27,7 @@ inline FieldView analytic_view(const Eigen::Vector3f& centre, const Eigen::Vecto
   view.pixel_from_world << k * view_from_world, -(k * view_from_world * centre);
   view.centre_in_world = centre;
   view.focal_px = focal;
-  PremultipliedImage image(size_px, size_px);
+  std::vector<Eigen::Vector4f> texels;
   for (int v = 0; v < size_px; ++v)
     for (int u = 0; u < size_px; ++u) {
       constexpr int n = 4;  // a pixel integrates: n × n rays
@@ -42,18 +42,9 @@ inline FieldView analytic_view(const Eigen::Vector3f& centre, const Eigen::Vecto
       const float edge =
           static_cast<float>(std::min({u, v, size_px - 1 - u, size_px - 1 - v})) / (0.1F * static_cast<float>(size_px));
       const float a = std::min(1.0F, edge);
-      image.at(u, v) << colour * a, a;
+      texels.emplace_back(colour.x() * a, colour.y() * a, colour.z() * a, a);
     }
-  view.levels.push_back(image);
-  while (view.levels.back().width() > 2) {
-    const PremultipliedImage& in = view.levels.back();
-    PremultipliedImage half((in.width() + 1) / 2, (in.height() + 1) / 2);
-    for (int v = 0; v < half.height(); ++v)
-      for (int u = 0; u < half.width(); ++u)
-        half.at(u, v) = 0.25F * (in.at(2 * u, 2 * v) + in.at(2 * u + 1, 2 * v) + in.at(2 * u, 2 * v + 1) +
-                                 in.at(2 * u + 1, 2 * v + 1));
-    view.levels.push_back(half);
-  }
+  view.levels = make_levels(size_px, size_px, texels);
   return view;
 }
 

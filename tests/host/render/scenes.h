@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "host/light_field/light_field.h"
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 #include "host/render/surface_point.h"
 
 namespace mf::test {

@@ -54,12 +54,6 @@ TEST(FieldPictures, DiscHasPlusYUp) {
   EXPECT_FLOAT_EQ(disc.confidence.at(32, 58), 0);
 }
 
-TEST(FieldPictures, DisplayExposureIgnoresALamp) {
-  ImageF picture(100, 100, 3, 0.5F);
-  for (int x = 0; x < 20; ++x) picture.at(x, 0) = 4000;
-  EXPECT_NEAR(display_exposure(picture), 0.9 / 0.5, 1e-6);
-}
-
 TEST(Html, EscapesWhatCouldEndATagOrAnAttribute) {
   EXPECT_EQ(html_escaped("<script>\"a\" & 'b'"), "&lt;script&gt;&quot;a&quot; &amp; &#39;b&#39;");
 }

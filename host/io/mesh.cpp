@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 #include <assimp/material.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <fmt/format.h>
 
 #include <assimp/Importer.hpp>
 #include <cmath>
 
+#include "common/atomic_file.h"
 #include "common/error.h"
 
 namespace mf {
@@ -103,6 +105,14 @@ TriangleMesh read_mesh(const std::filesystem::path& path, const MeshOptions& opt
   repair(mesh);
   if (mesh.triangles.empty()) throw InputError(file, "", "holds no triangle: export the mesh with its faces");
   return mesh;
+}
+
+void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh) {
+  std::string text;
+  for (const Eigen::Vector3f& p : mesh.positions) text += fmt::format("v {} {} {}\n", p.x(), p.y(), p.z());
+  for (const Eigen::Vector3f& n : mesh.normals) text += fmt::format("vn {} {} {}\n", n.x(), n.y(), n.z());
+  for (const auto& [a, b, c] : mesh.triangles) text += fmt::format("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1);
+  write_file_atomically(path, text);
 }
 
 TriangleMesh transformed(const Rigid3& target_from_source, TriangleMesh mesh) {

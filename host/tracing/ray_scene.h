@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "host/render/mesh.h"
+#include "host/io/mesh.h"
 
 namespace mf {
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/render/view.h"
+#include "host/io/view.h"
 
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "common/error.h"
 #include "common/json_file.h"
@@ -51,8 +52,11 @@ View read_view(const std::filesystem::path& path, int index, std::optional<std::
   const int count = static_cast<int>(views.size());
   if (index < 0 || index >= count)
     throw InputError(file, "", fmt::format("has no view {}: choose one of 0 to {}", index, count - 1));
-  const nlohmann::json& entry = views[static_cast<std::size_t>(index)];
-  const std::string prefix = fmt::format("[{}].", index);
+  return view_from_json(views[static_cast<std::size_t>(index)], fmt::format("[{}].", index), file, size_px);
+}
+
+View view_from_json(const nlohmann::json& entry, const std::string& prefix, const std::string& file,
+                    std::optional<std::array<int, 2>> size_px) {
   View view;
   view.camera = read_camera(entry, prefix, file);
   if (!entry.contains("camera_from_world"))

@@ -3,7 +3,9 @@
 
 #include <array>
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <string>
 
 #include "common/camera_model.h"
 #include "common/rigid3.h"
@@ -21,5 +23,9 @@ struct View {
 // principal point. Throws InputError naming the file and the field: a missing or singular K, no rigid transform, an
 // index that the list does not have, a principal point outside of the picture (a plate of another size).
 [[nodiscard]] View read_view(const std::filesystem::path&, int index, std::optional<std::array<int, 2>> size_px = {});
+
+// The same for an entry of such a list that is already read; `prefix` names it in errors, as "[3].".
+[[nodiscard]] View view_from_json(const nlohmann::json& entry, const std::string& prefix, const std::string& file,
+                                  std::optional<std::array<int, 2>> size_px = {});
 
 }  // namespace mf

@@ -34,6 +34,9 @@ inline constexpr float default_albedo = 0.7F;
 // Throws InputError naming the file: missing, unreadable, no triangle, a coordinate that is not finite.
 [[nodiscard]] TriangleMesh read_mesh(const std::filesystem::path&, const MeshOptions& = {});
 
+// Wavefront OBJ: positions, normals and triangles, coordinates as they are. Written aside and renamed.
+void write_obj(const std::filesystem::path&, const TriangleMesh&);
+
 [[nodiscard]] TriangleMesh transformed(const Rigid3& target_from_source, TriangleMesh);
 
 // The axis-aligned box of every vertex, and a sphere about its centre that holds them too. Empty mesh: all zero.

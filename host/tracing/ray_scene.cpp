@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/render/ray_scene.h"
+#include "host/tracing/ray_scene.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/block_blend.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "host/light_field/half_floats.h"
+
+// One machine code for every amd64, one for those with AVX2, FMA and F16C (x86-64-v3); the loader picks. Results differ
+// in the last bits between the two, never between runs or threads on one machine.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v3", "default")))
+#else
+#define MF_VECTORIZED
+#endif
+
+namespace mf {
+
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float largest = std::numeric_limits<float>::max();
+constexpr std::size_t side = block_side;
+
+// A texel's weights between vertices 0 and 1 (texels 0 to 3) or 1 and 2 (4 to 7).
+constexpr std::array<std::array<float, side>, patch_side> vertex_weight{
+    {{0.875F, 0.625F, 0.375F, 0.125F, 0, 0, 0, 0},
+     {0.125F, 0.375F, 0.625F, 0.875F, 0.875F, 0.625F, 0.375F, 0.125F},
+     {0, 0, 0, 0, 0.125F, 0.375F, 0.625F, 0.875F}}};
+
+[[gnu::always_inline]] inline void interpolate_channel(const float* vertices, float* out) {
+  for (std::size_t y = 0; y < side; ++y) {
+    std::array<float, patch_side> row;
+    for (std::size_t x = 0; x < patch_side; ++x)
+      row[x] = vertex_weight[0][y] * vertices[x] + vertex_weight[1][y] * vertices[patch_side + x] +
+               vertex_weight[2][y] * vertices[2 * patch_side + x];
+    for (std::size_t x = 0; x < side; ++x)
+      out[y * side + x] = row[0] * vertex_weight[0][x] + row[1] * vertex_weight[1][x] + row[2] * vertex_weight[2][x];
+  }
+}
+
+Patch<float> channel(const Patch<Eigen::Vector4f>& values, Eigen::Index c) {
+  Patch<float> out;
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = values[i][c];
+  return out;
+}
+
+}  // namespace
+
+MF_VECTORIZED void interpolate(const Patch<float>& vertices, Lanes& out) {
+  interpolate_channel(vertices.data(), out.v.data());
+}
+
+void interpolate(const Patch<Eigen::Vector4f>& vertices, Lanes4& out) {
+  interpolate(channel(vertices, 0), out.x);
+  interpolate(channel(vertices, 1), out.y);
+  interpolate(channel(vertices, 2), out.z);
+  interpolate(channel(vertices, 3), out.w);
+}
+
+void set_points(const Eigen::Vector3f& first, const Eigen::Vector3f& step_x, const Eigen::Vector3f& step_y,
+                Lanes3& out) {
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    const float x = static_cast<float>(i % side), y = static_cast<float>(i / side);
+    out.x.v[i] = first.x() + x * step_x.x() + y * step_y.x();
+    out.y.v[i] = first.y() + x * step_x.y() + y * step_y.y();
+    out.z.v[i] = first.z() + x * step_x.z() + y * step_y.z();
+  }
+}
+
+MF_VECTORIZED void distance_penalties(const Lanes3& p, const Lanes4& proxy_point, const Eigen::Vector3f& centre,
+                                      const Lanes& weight, Lanes& penalty) {
+  const float cx = centre.x(), cy = centre.y(), cz = centre.z();
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    const float s = proxy_point.w.v[i];
+    const float rx = proxy_point.x.v[i] - s * cx, ry = proxy_point.y.v[i] - s * cy, rz = proxy_point.z.v[i] - s * cz;
+    const float qx = p.x.v[i] - cx, qy = p.y.v[i] - cy, qz = p.z.v[i] - cz;
+    const float x = qy * rz - qz * ry, y = qz * rx - qx * rz, z = qx * ry - qy * rx;
+    const float distance = std::sqrt((x * x + y * y + z * z) / (rx * rx + ry * ry + rz * rz));
+    penalty.v[i] = weight.v[i] >= smallest_view_weight ? distance / weight.v[i] : infinity;
+  }
+}
+
+MF_VECTORIZED void angle_penalties(const Lanes3& p, const Eigen::Vector3f& direction, const Eigen::Vector3f& centre,
+                                   const Lanes& weight, Lanes& penalty) {
+  const float cx = centre.x(), cy = centre.y(), cz = centre.z();
+  const float dx = direction.x(), dy = direction.y(), dz = direction.z();
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    const float rx = p.x.v[i] - cx, ry = p.y.v[i] - cy, rz = p.z.v[i] - cz;
+    const float inverse = 1 / std::sqrt(rx * rx + ry * ry + rz * rz);
+    const float x = rx * inverse - dx, y = ry * inverse - dy, z = rz * inverse - dz;
+    const float chord2 = x * x + y * y + z * z, h = 0.25F * chord2;
+    // 2 asin(chord / 2) by its series: exact to 10⁻⁵ below 60°, and rising beyond, where no view speaks anyway.
+    const float angle =
+        std::sqrt(chord2) *
+        (1 + h * (1.0F / 6 + h * (3.0F / 40 + h * (15.0F / 336 + h * (105.0F / 3456 + h * (945.0F / 42240))))));
+    penalty.v[i] = weight.v[i] >= smallest_view_weight ? angle / weight.v[i] : infinity;
+  }
+}
+
+MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes> view_weights, int k, float floor,
+                              Lanes& confidence) {
+  // The k + 1 least penalties of every texel, rising: each candidate sinks to its place.
+  const std::size_t kept = static_cast<std::size_t>(k) + 1;
+  std::array<Lanes, 65> least;
+  Lanes worst{};
+  for (std::size_t j = 0; j < kept; ++j)
+    for (std::size_t i = 0; i < block_lanes; ++i) least[j].v[i] = infinity;
+  std::size_t known = 0;
+  for (const Lanes& penalty : penalties) {
+    Lanes sinking = penalty;
+    int better = 0;
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const float finite = sinking.v[i] < infinity ? sinking.v[i] : 0.0F;
+      worst.v[i] = std::max(worst.v[i], finite);
+      better += sinking.v[i] < least[kept - 1].v[i] ? 1 : 0;
+    }
+    if (better == 0) continue;
+    known = std::min(known + 1, kept);
+    for (std::size_t j = 0; j < known; ++j)
+      for (std::size_t i = 0; i < block_lanes; ++i) {
+        const float a = least[j].v[i], b = sinking.v[i];
+        least[j].v[i] = std::min(a, b);
+        sinking.v[i] = std::max(a, b);
+      }
+  }
+  Lanes inverse_threshold, sum{};
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    const float next = least[kept - 1].v[i];
+    const float threshold = (next < infinity ? next : 1.1F * worst.v[i]) + floor;
+    inverse_threshold.v[i] = 1 / (threshold + 1e-3F * floor);
+    confidence.v[i] = 0;
+  }
+  const Lanes& last = least[kept - 2];
+  for (std::size_t c = 0; c < penalties.size(); ++c)
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const float penalty = penalties[c].v[i] + floor;
+      const float above = std::max(0.0F, 1 - penalty * inverse_threshold.v[i]);
+      const float speaks = penalties[c].v[i] <= std::min(last.v[i], largest) ? 1.0F : 0.0F;
+      const float weight = speaks * above / penalty;
+      confidence.v[i] += speaks * view_weights[c].v[i];
+      sum.v[i] += weight;
+      penalties[c].v[i] = weight;
+    }
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    constexpr float nobody = 1e-30F;  // where no view speaks, 0 times this one's inverse is still 0
+    sum.v[i] = 1 / std::max(sum.v[i], nobody);
+    confidence.v[i] = std::min(confidence.v[i], 1.0F);
+  }
+  for (std::size_t c = 0; c < penalties.size(); ++c)
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const float a = view_weights[c].v[i];  // too small: the weight is 0
+      penalties[c].v[i] *= sum.v[i] / std::max(a, smallest_view_weight);
+    }
+}
+
+namespace {
+
+MF_VECTORIZED void add_channel(const Patch<float>& seen, const Lanes& weight, Lanes& colour) {
+  Lanes here;
+  interpolate_channel(seen.data(), here.v.data());
+  for (std::size_t i = 0; i < block_lanes; ++i) colour.v[i] += weight.v[i] * here.v[i];
+}
+
+MF_VECTORIZED void add_halves(const std::uint16_t* seen, float scale, const Lanes& weight, Lanes& colour) {
+  for (std::size_t i = 0; i < block_lanes; ++i) colour.v[i] += weight.v[i] * (scale * shifted_half(seen[i]));
+}
+
+}  // namespace
+
+void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3& colour) {
+  add_channel(channel(seen, 0), weight, colour.x);
+  add_channel(channel(seen, 1), weight, colour.y);
+  add_channel(channel(seen, 2), weight, colour.z);
+}
+
+void add_colours(const std::uint16_t* seen, float unit, const Lanes& weight, Lanes3& colour) {
+  // In two steps, each within a float's range: half_unshift · unit may not be.
+  Lanes scaled;
+  for (std::size_t i = 0; i < block_lanes; ++i) scaled.v[i] = weight.v[i] * unit;
+  add_halves(seen, half_unshift, scaled, colour.x);
+  add_halves(seen + block_lanes, half_unshift, scaled, colour.y);
+  add_halves(seen + 2 * block_lanes, half_unshift, scaled, colour.z);
+}
+
+MF_VECTORIZED void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour) {
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    colour.x.v[i] += weight.v[i] * seen.x.v[i];
+    colour.y.v[i] += weight.v[i] * seen.y.v[i];
+    colour.z.v[i] += weight.v[i] * seen.z.v[i];
+  }
+}
+
+MF_VECTORIZED void decode_weights(const std::uint16_t* halves, Lanes& out) {
+  for (std::size_t i = 0; i < block_lanes; ++i) out.v[i] = half_unshift * shifted_half(halves[i]);
+}
+
+MF_VECTORIZED void squared_ray_distances(const Eigen::Vector3f& p, const Eigen::Vector4f& proxy_point,
+                                         const float* centre_x, const float* centre_y, const float* centre_z,
+                                         std::size_t n, float* out) {
+  const float px = p.x(), py = p.y(), pz = p.z();
+  const float fx = proxy_point.x(), fy = proxy_point.y(), fz = proxy_point.z(), s = proxy_point.w();
+  for (std::size_t i = 0; i < n; ++i) {
+    const float cx = centre_x[i], cy = centre_y[i], cz = centre_z[i];
+    const float rx = fx - s * cx, ry = fy - s * cy, rz = fz - s * cz;
+    const float qx = px - cx, qy = py - cy, qz = pz - cz;
+    const float x = qy * rz - qz * ry, y = qz * rx - qx * rz, z = qx * ry - qy * rx;
+    out[i] = (x * x + y * y + z * z) / (rx * rx + ry * ry + rz * rz);
+  }
+}
+
+MF_VECTORIZED void squared_chords(const Eigen::Vector3f& direction, const float* ray_x, const float* ray_y,
+                                  const float* ray_z, const float* factor, std::size_t n, float* out) {
+  const float dx = direction.x(), dy = direction.y(), dz = direction.z();
+  for (std::size_t i = 0; i < n; ++i) {
+    const float x = ray_x[i] - dx, y = ray_y[i] - dy, z = ray_z[i] - dz;
+    out[i] = (x * x + y * y + z * z) * factor[i];
+  }
+}
+
+}  // namespace mf

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/just_in_time.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "common/check.h"
+#include "host/light_field/emitter_blender.h"
+#include "host/light_field/plane_tiles.h"
+#include "host/light_field/tile_resampler.h"
+
+namespace mf {
+
+namespace {
+
+constexpr int emitter_step = 4;    // texels of the light field between the points at which emitters are drawn, as there
+constexpr int emitter_splits = 3;  // a cell's parts for them: 6 · 2³, as there
+// A preview's texels are no larger. The resampler looks for emitters at every fourth texel, and must not step over the
+// glare beside one, which it takes to reach 12 cm.
+constexpr float coarsest_texel_m = 0.05F;
+
+int whole_blocks(float texels) {
+  return block_side * std::max(1, static_cast<int>(std::ceil(texels / static_cast<float>(block_side))));
+}
+
+struct Rectangle {
+  Eigen::Vector2f min_m, max_m;
+};
+
+// The part of [low, high] that [from, to] asks for, at least `least` wide.
+void keep_inside(float low, float high, float least, float& from, float& to) {
+  from = std::clamp(from, low, high - least);
+  to = std::clamp(to, std::min(from + least, high), high);
+}
+
+Rectangle inside(const LightField& field, const TileRequest& request) {
+  const Eigen::Vector2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
+  const Eigen::Vector2f texel = (high - low) / static_cast<float>(field.resolution);
+  Rectangle r{request.min_m, request.max_m};
+  for (int axis = 0; axis < 2; ++axis) keep_inside(low[axis], high[axis], texel[axis], r.min_m[axis], r.max_m[axis]);
+  return r;
+}
+
+// An empty tile whose outermost texels' centres lie on the rectangle's sides: nothing within is extrapolated.
+PlaneTile even_tile(const Rectangle& r, int texels) {
+  const Eigen::Vector2f half = (r.max_m - r.min_m) / (2.F * static_cast<float>(texels - 1));
+  PlaneTile tile{r.min_m - half, r.max_m + half, texels, texels, {}};
+  tile.texels.assign(static_cast<std::size_t>(texels) * static_cast<std::size_t>(texels), Eigen::Vector4f::Zero());
+  return tile;
+}
+
+// An empty tile over the rectangle whose texel centres are those points at which the light field draws its emitters.
+PlaneTile emitter_tile(const LightField& field, const Rectangle& r) {
+  const Eigen::Vector2f low = field.plane.min_m.cast<float>();
+  const Eigen::Vector2f step = (field.plane.max_m.cast<float>() - low) *
+                               (static_cast<float>(emitter_step) / static_cast<float>(field.resolution));
+  const Eigen::Array2f first = ((r.min_m - low).array() / step.array()).floor();
+  const Eigen::Array2f last = ((r.max_m - low).array() / step.array()).ceil();
+  PlaneTile tile;
+  tile.min_m = low + ((first - 0.5F) * step.array()).matrix();
+  tile.max_m = low + ((last + 0.5F) * step.array()).matrix();
+  tile.width = static_cast<int>(last.x() - first.x()) + 1;
+  tile.height = static_cast<int>(last.y() - first.y()) + 1;
+  tile.texels.assign(static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height),
+                     Eigen::Vector4f::Zero());
+  return tile;
+}
+
+// One thread's working memory: a light field of few texels, whose rectangle is the request's.
+class Worker {
+ public:
+  Worker(const std::vector<FieldView>& views, const LightField& focused, const EmitterBlender& dark, int k,
+         int most_texels)
+      : views_(views), focused_(focused), dark_(dark), k_(k), most_texels_(most_texels) {
+    part_.directions = focused.directions;
+    part_.surroundings.centre_in_world = focused.surroundings.centre_in_world;
+    part_.surroundings.inverse_distance = focused.surroundings.inverse_distance;
+  }
+
+  PlaneTile fill(const TileRequest& request) {
+    const Rectangle where = inside(focused_, request);
+    part_.resolution = texels_for(where);
+    PlaneTile smooth = even_tile(where, part_.resolution);
+    PlaneTile emitted = emitter_tile(focused_, where);
+    of_cell_ = smooth;
+    part_.plane = {focused_.plane.world_from_plane, smooth.min_m.cast<double>(), smooth.max_m.cast<double>()};
+    TileResampler resampler(views_, part_, dark_, k_);
+    float solid_angle = 0;
+    for (const std::uint32_t cell : request.cells) solid_angle += part_.directions.solid_angles_sr[cell];
+    bool any_emitter = false;
+    for (const std::uint32_t cell : request.cells) {
+      const float share = part_.directions.solid_angles_sr[cell] / solid_angle;
+      resampler.fill(cell, of_cell_.texels.data());
+      for (std::size_t t = 0; t < smooth.texels.size(); ++t) smooth.texels[t] += share * of_cell_.texels[t];
+      any_emitter = add_emitters(cell, share, emitted) || any_emitter;
+    }
+    if (!any_emitter) return smooth;
+    for (int y = 0; y < emitted.height; ++y)
+      for (int x = 0; x < emitted.width; ++x)
+        emitted.texels[static_cast<std::size_t>(y * emitted.width + x)] +=
+            sample(smooth.image(), emitted.position(x, y));
+    return emitted;
+  }
+
+ private:
+  // Along each side, in whole blocks of the resampler.
+  [[nodiscard]] int texels_for(const Rectangle& r) const {
+    const Eigen::Vector2f part = (r.max_m - r.min_m).cwiseQuotient(focused_.plane.size_m().cast<float>());
+    const int as_field = whole_blocks(part.maxCoeff() * static_cast<float>(focused_.resolution));
+    const int fewest = whole_blocks((r.max_m - r.min_m).maxCoeff() / coarsest_texel_m);
+    return std::min(as_field, std::max(fewest, most_texels_));
+  }
+
+  // Adds share · (the emitters' light, mean over the cell). Returns whether there is any.
+  bool add_emitters(std::uint32_t cell, float share, PlaneTile& emitted);
+
+  // Light of the emitters whose masks are known, integrated over the cell, as seen from p (world), and the solid angle
+  // of the parts that they fill.
+  [[nodiscard]] Eigen::Vector4f emitted_at(const Eigen::Vector3f& p) const;
+
+  const std::vector<FieldView>& views_;
+  const LightField& focused_;
+  const EmitterBlender& dark_;
+  int k_;
+  int most_texels_;
+  LightField part_;
+  PlaneTile of_cell_;              // what the cell at hand shows but for the emitters; w: confidence
+  std::vector<CellSample> parts_;  // of the cell at hand, directions in the world
+};
+
+Eigen::Vector4f Worker::emitted_at(const Eigen::Vector3f& p) const {
+  Eigen::Vector4f sum = Eigen::Vector4f::Zero();
+  for (const CellSample& part : parts_)
+    for (const ShadedEmitter& e : focused_.emitters) {
+      if (!e.met_at(p, part.direction)) continue;
+      if (const auto visible = e.visibility(p, part.direction)) {
+        sum.head<3>() += part.solid_angle_sr * *visible * e.radiance;
+        sum.w() += part.solid_angle_sr;
+      }
+      break;  // the light field, too, lets the first that a ray meets speak
+    }
+  return sum;
+}
+
+bool Worker::add_emitters(std::uint32_t cell, float share, PlaneTile& emitted) {
+  const Eigen::Matrix3f turn = focused_.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f origin = focused_.plane.world_from_plane.translation.cast<float>();
+  const Eigen::Vector3f direction = turn * part_.directions.directions[cell];
+  const float solid_angle = part_.directions.solid_angles_sr[cell];
+  const float angle = std::sqrt(solid_angle);  // a cell's corners are nearer to its direction than that
+  const auto near = [&](const Eigen::Vector3f& p) {
+    return std::any_of(focused_.emitters.begin(), focused_.emitters.end(), [&](const ShadedEmitter& e) {
+      const Eigen::Vector3f to = e.emitter.position - p;
+      const float along = to.dot(direction);
+      return along > 0 && to.cross(direction).norm() < e.emitter.radius_m + angle * along;
+    });
+  };
+  parts_.clear();
+  for (int y = 0; y < emitted.height; ++y)
+    for (int x = 0; x < emitted.width; ++x) {
+      const Eigen::Vector2f at = emitted.position(x, y);
+      const Eigen::Vector3f p = origin + turn * Eigen::Vector3f(at.x(), at.y(), 0);
+      if (!near(p)) continue;
+      if (parts_.empty()) {
+        parts_ = split_cell(part_.directions, cell, emitter_splits);
+        for (CellSample& part : parts_) part.direction = turn * part.direction;
+      }
+      const Eigen::Vector4f light = emitted_at(p) / solid_angle;
+      // As the light field has it: a cell's colour is the mean over what was seen of the cell.
+      const float seen = std::max(sample(of_cell_.image(), at).w(), light.w());
+      if (seen > 0)
+        emitted.texels[static_cast<std::size_t>(y * emitted.width + x)].head<3>() += share / seen * light.head<3>();
+    }
+  return !parts_.empty();
+}
+
+// With the plane as proxy a point of it is one pixel of a view for all directions: the views are warped onto it once.
+std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const LightField& focused, int k,
+                                      std::span<const TileRequest> requests, int most_texels) {
+  LightField part;
+  part.plane = focused.plane;
+  part.directions = focused.directions;
+  const int coarsest = whole_blocks(static_cast<float>(focused.plane.size_m().maxCoeff()) / coarsest_texel_m);
+  part.resolution = std::min(focused.resolution, std::max(coarsest, most_texels));
+  const RectifiedViews rectified(views, part.plane, part.resolution);
+  tbb::enumerable_thread_specific<PlaneTiles> resamplers([&] { return PlaneTiles(rectified, part, k); });
+  std::vector<PlaneTile> tiles(requests.size());
+  tbb::parallel_for(std::size_t{0}, requests.size(), [&](std::size_t i) {
+    PlaneTile& tile = tiles[i];
+    tile = {part.plane.min_m.cast<float>(), part.plane.max_m.cast<float>(), part.resolution, part.resolution, {}};
+    tile.texels.assign(part.texel_count(), Eigen::Vector4f::Zero());
+    std::vector<Eigen::Vector4f> of_cell(part.texel_count());
+    float solid_angle = 0;
+    for (const std::uint32_t cell : requests[i].cells) {
+      resamplers.local().fill(cell, of_cell.data());
+      solid_angle += part.directions.solid_angles_sr[cell];
+      for (std::size_t t = 0; t < of_cell.size(); ++t)
+        tile.texels[t] += part.directions.solid_angles_sr[cell] * of_cell[t];
+    }
+    for (Eigen::Vector4f& texel : tile.texels) texel /= solid_angle;
+  });
+  return tiles;
+}
+
+}  // namespace
+
+std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views, const LightField& focused, int k,
+                                             std::span<const TileRequest> requests, const JustInTimeOptions& options) {
+  check(options.most_texels >= 8 && options.most_texels % 8 == 0, "a multiple of 8 texels");
+  if (focused.surroundings.is_plane()) return over_the_plane(views, focused, k, requests, options.most_texels);
+  // The emitters without their light: rays that meet them are black, and views that show their glare have no say.
+  std::vector<ShadedEmitter> dark_emitters = focused.emitters;
+  for (ShadedEmitter& e : dark_emitters) e.radiance.setZero();
+  const EmitterBlender dark(views, focused.surroundings, std::move(dark_emitters));
+  tbb::enumerable_thread_specific<Worker> workers([&] { return Worker(views, focused, dark, k, options.most_texels); });
+  std::vector<PlaneTile> tiles(requests.size());
+  tbb::parallel_for(std::size_t{0}, requests.size(),
+                    [&](std::size_t i) { tiles[i] = workers.local().fill(requests[i]); });
+  return tiles;
+}
+
+}  // namespace mf

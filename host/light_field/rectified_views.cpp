@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/rectified_views.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "host/light_field/view_rays.h"
+
+namespace mf {
+
+TexelGrid::TexelGrid(const PlaneRectangle& plane, int resolution) {
+  const Eigen::Vector2d step = plane.size_m() / resolution;
+  const Eigen::Matrix3d turn = plane.world_from_plane.rotation.toRotationMatrix();
+  origin = (plane.world_from_plane * Eigen::Vector3d(plane.min_m.x(), plane.max_m.y(), 0)).cast<float>();
+  step_x = (turn.col(0) * step.x()).cast<float>();
+  step_y = (turn.col(1) * -step.y()).cast<float>();
+}
+
+RectifiedViews::RectifiedViews(const std::vector<FieldView>& views, const PlaneRectangle& plane, int resolution)
+    : grid_(plane, resolution),
+      texel_m_(static_cast<float>(plane.size_m().maxCoeff() / resolution)),
+      blocks_((resolution + block_side - 1) / block_side),
+      block_(static_cast<std::size_t>(blocks_ * blocks_)) {
+  for (const FieldView& view : views) {
+    centre_.push_back(view.centre_in_world);
+    unit_.push_back(view.levels.front().unit());
+  }
+  tbb::parallel_for(0, blocks_ * blocks_, [&](int i) { rectify(views, i % blocks_, i / blocks_); });
+}
+
+namespace {
+
+// What a view shows of a texel of the plane.
+Eigen::Vector4f look_at(const FieldView& view, const Eigen::Vector3f& p, float texel_m) {
+  const ProxyPoint x = p.homogeneous();
+  const Eigen::Vector3f pixel = pixel_of(view, x);
+  if (pixel.z() <= 0) return Eigen::Vector4f::Zero();
+  return view.fetch(level_for_angle(view, x, texel_m), pixel.x() / pixel.z(), pixel.y() / pixel.z());
+}
+
+// Whether a view may show some of a quadrangle: its corners do not all lie beyond one edge of the picture. `reach_px`:
+// how far an interpolation reaches.
+bool may_see(const FieldView& view, const std::array<Eigen::Vector3f, 4>& corners, float reach_px) {
+  const float width = static_cast<float>(view.levels.front().width()) + reach_px;
+  const float height = static_cast<float>(view.levels.front().height()) + reach_px;
+  int left = 0, right = 0, above = 0, below = 0, behind = 0;
+  for (const Eigen::Vector3f& corner : corners) {
+    const Eigen::Vector3f pixel = pixel_of(view, corner.homogeneous());
+    if (pixel.z() <= 0) {
+      ++behind;
+      continue;
+    }
+    const float u = pixel.x() / pixel.z(), v = pixel.y() / pixel.z();
+    left += u < -reach_px ? 1 : 0;
+    right += u > width ? 1 : 0;
+    above += v < -reach_px ? 1 : 0;
+    below += v > height ? 1 : 0;
+  }
+  if (behind > 0) return behind < 4;
+  return left < 4 && right < 4 && above < 4 && below < 4;
+}
+
+}  // namespace
+
+void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, int block_y) {
+  Block& block = block_[static_cast<std::size_t>(block_y * blocks_ + block_x)];
+  const float x0 = static_cast<float>(block_x * block_side), y0 = static_cast<float>(block_y * block_side);
+  const std::array<Eigen::Vector3f, 4> corners{grid_.at(x0, y0), grid_.at(x0 + block_side, y0),
+                                               grid_.at(x0, y0 + block_side),
+                                               grid_.at(x0 + block_side, y0 + block_side)};
+  const Eigen::Vector3f middle = grid_.at(x0 + 0.5F * block_side, y0 + 0.5F * block_side);
+  std::array<std::uint16_t, 4 * block_lanes> texels;
+  for (std::uint32_t v = 0; v < views.size(); ++v) {
+    const float texel_px = texel_m_ * views[v].focal_px / (corners[0] - views[v].centre_in_world).norm();
+    if (!may_see(views[v], corners, 2 * texel_px + 2)) continue;
+    float most = 0;
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const Eigen::Vector3f p =
+          grid_.at(x0 + static_cast<float>(i % block_side) + 0.5F, y0 + static_cast<float>(i / block_side) + 0.5F);
+      const Eigen::Vector4f shown = look_at(views[v], p, texel_m_);
+      for (std::size_t c = 0; c < 3; ++c)
+        texels[c * block_lanes + i] = to_normal_half(shown[static_cast<Eigen::Index>(c)] / unit_[v]);
+      texels[3 * block_lanes + i] = to_normal_half(shown.w());
+      most = std::max(most, shown.w());
+    }
+    if (most < smallest_view_weight) continue;
+    const Eigen::Vector3f ray = (middle - views[v].centre_in_world).normalized();
+    block.views.push_back(v);
+    block.ray_x.push_back(ray.x());
+    block.ray_y.push_back(ray.y());
+    block.ray_z.push_back(ray.z());
+    block.factor.push_back(1 / (most * most));
+    block.texels.insert(block.texels.end(), texels.begin(), texels.end());
+  }
+}
+
+}  // namespace mf

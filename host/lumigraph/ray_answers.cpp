@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/lumigraph/ray_answers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+// The loops over rays are written for the compiler's vectorizer: no branch but selections, no call. (This file is
+// compiled with -fno-math-errno and -fno-trapping-math, without which square roots and selections stay scalar.)
+#define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v3", "default")))
+
+namespace mf {
+
+namespace {
+
+constexpr float infinite = std::numeric_limits<float>::infinity();
+// A patch seen edge-on covers no pixels; where normals are interpolated or noisy this says nothing about resolution.
+constexpr float least_cosine = 0.05F;
+constexpr float nearest = 1e-3F;  // of the depth in the new view: points nearer to a photo's camera plane are not in it
+
+float smooth(float t) {
+  const float c = std::min(std::max(t, 0.0F), 1.0F);
+  return c * c * (3 - 2 * c);
+}
+
+// Everything but visibility. The penalty's place holds the penalty before it is divided by the weight.
+template <bool distorted>
+inline __attribute__((always_inline)) void project_all(const AnsweringView& v, const RayBundle& rays,
+                                                       const PenaltyOptions& o, const RayAnswers& out,
+                                                       float* __restrict inverse_depth, float* __restrict weight) {
+  const std::size_t count = rays.dx.size();
+  const AnsweringCamera c = v.camera;
+  const float* __restrict dx = rays.dx.data();
+  const float* __restrict dy = rays.dy.data();
+  const float* __restrict dz = rays.dz.data();
+  const float* __restrict depth = rays.depth.data();
+  const float* __restrict nx = rays.nx.data();
+  const float* __restrict ny = rays.ny.data();
+  const float* __restrict nz = rays.nz.data();
+  float* __restrict out_x = out.x.data();
+  float* __restrict out_y = out.y.data();
+  float* __restrict out_lod = out.lod.data();
+  float* __restrict out_plain = out.penalty.data();
+  const auto r = v.cam_from_world;
+  const auto d = c.distortion;
+  const float focal2 = c.fx * c.fy;
+  const float focal2_ratio = rays.focal2 / focal2;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float px = depth[i] * dx[i];
+    const float py = depth[i] * dy[i];
+    const float pz = depth[i] * dz[i];
+    const float xc = r[0] * px + r[1] * py + r[2] * pz + v.eye_in_cam[0];
+    const float yc = r[3] * px + r[4] * py + r[5] * pz + v.eye_in_cam[1];
+    const float zc = r[6] * px + r[7] * py + r[8] * pz + v.eye_in_cam[2];
+    const bool before = zc > nearest * depth[i];
+    const float inverse = 1 / (before ? zc : 1.0F);
+    float x = xc * inverse;
+    float y = yc * inverse;
+    const float r2 = x * x + y * y;
+    if constexpr (distorted) {
+      const float radial = 1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+      const float xd = x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x);
+      const float yd = y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y;
+      x = xd;
+      y = yd;
+    }
+    const float u = c.fx * x + c.cx;
+    const float w = c.fy * y + c.cy;
+
+    const float wx = px + v.eye_from_centre[0];
+    const float wy = py + v.eye_from_centre[1];
+    const float wz = pz + v.eye_from_centre[2];
+    const float per_view = 1 / std::sqrt(wx * wx + wy * wy + wz * wz);
+    const float per_ray = 1 / std::sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
+    const float ax = wx * per_view - dx[i] * per_ray;
+    const float ay = wy * per_view - dy[i] * per_ray;
+    const float az = wz * per_view - dz[i] * per_ray;
+    const float chord = std::sqrt(ax * ax + ay * ay + az * az);
+
+    const float cos_view = std::max(std::abs(nx[i] * wx + ny[i] * wy + nz[i] * wz) * per_view, least_cosine);
+    const float cos_ray = std::max(std::abs(nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]) * per_ray, least_cosine);
+    // Areas: f² cos |X−C| / z³, and for the new view with |X−E| = depth · |d|, z = depth.
+    const float area_ratio = focal2_ratio * (cos_ray * per_view * zc * zc * zc) / (per_ray * cos_view * depth[i] * depth[i]);
+    const float octaves = 0.5F * approximate_log2(before ? area_ratio : 1.0F);
+
+    const float to_side = std::min(u, c.width - u) * v.per_border_px;
+    const float to_top = std::min(w, c.height - w) * v.per_border_px;
+    const bool inside = before && r2 < c.largest_r2;
+    const float sx = std::min(std::max(to_side, 0.0F), 1.0F);
+    const float sy = std::min(std::max(to_top, 0.0F), 1.0F);
+    const float border = sx * sx * (3 - 2 * sx) * sy * sy * (3 - 2 * sy);
+
+    out_x[i] = u;
+    out_y[i] = w;
+    out_lod[i] = std::max(-octaves, 0.0F);
+    out_plain[i] = o.angle * chord + o.resolution * std::max(octaves, 0.0F) + v.time_penalty;
+    inverse_depth[i] = inverse;
+    weight[i] = inside ? border : 0.0F;
+  }
+}
+
+// What the photo sees at (x, y) of a point at this inverse depth: between four texels.
+float sight_at(const SourceSight& sight, float x, float y, float inverse_depth, float tolerance) {
+  const float u = std::clamp(x * sight.texels_per_px - 0.5F, 0.0F, static_cast<float>(sight.width - 1));
+  const float v = std::clamp(y * sight.texels_per_px - 0.5F, 0.0F, static_cast<float>(sight.height - 1));
+  const int x0 = static_cast<int>(u);
+  const int y0 = static_cast<int>(v);
+  const int right = x0 + 1 < sight.width ? 1 : 0;
+  const int below = y0 + 1 < sight.height ? sight.width : 0;
+  const float a = u - static_cast<float>(x0);
+  const float b = v - static_cast<float>(y0);
+  const SourceSight::Texel* t = sight.texels.data() + static_cast<std::ptrdiff_t>(y0) * sight.width + x0;
+  const auto between = [&](auto value) {
+    const float top = value(t[0]) + a * (value(t[right]) - value(t[0]));
+    const float bottom = value(t[below]) + a * (value(t[below + right]) - value(t[below]));
+    return top + b * (bottom - top);
+  };
+  constexpr float per_code = 1.0F / 65535;
+  const float surface = between([](auto texel) { return static_cast<float>(texel.inverse_depth); }) * per_code;
+  const float trust = between([](auto texel) { return static_cast<float>(texel.trust); }) * per_code;
+  const float behind = surface * sight.scale / inverse_depth - 1;  // of the point's depth: 0 on the surface
+  return trust * std::max(least_sight, 1 - smooth(behind / tolerance - 1));
+}
+
+MF_VECTORIZED void project_plain(const AnsweringView& v, const RayBundle& rays, const PenaltyOptions& o,
+                                 const RayAnswers& out, float* inverse_depth, float* weight) {
+  project_all<false>(v, rays, o, out, inverse_depth, weight);
+}
+
+MF_VECTORIZED void project_distorted(const AnsweringView& v, const RayBundle& rays, const PenaltyOptions& o,
+                                     const RayAnswers& out, float* inverse_depth, float* weight) {
+  project_all<true>(v, rays, o, out, inverse_depth, weight);
+}
+
+// penalty / weight^γ for γ = ½, whose root is a machine instruction, and for any other.
+MF_VECTORIZED void divide_by_root(float* __restrict penalty, const float* __restrict weight, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i)
+    penalty[i] = weight[i] > 0 ? penalty[i] / std::sqrt(std::max(weight[i], 1e-20F)) : infinite;
+}
+
+void divide_by_power(std::span<float> penalty, std::span<const float> weight, float gamma) {
+  for (std::size_t i = 0; i < penalty.size(); ++i)
+    penalty[i] = weight[i] > 0 ? penalty[i] / std::pow(weight[i], gamma) : infinite;
+}
+
+MF_VECTORIZED void insert(float* __restrict penalty, std::int32_t* __restrict candidate, std::size_t rays, int rows,
+                          std::int32_t id, float* __restrict moving_penalty, std::int32_t* __restrict moving) {
+  for (std::size_t i = 0; i < rays; ++i) moving[i] = id;
+  for (int row = 0; row < rows; ++row) {
+    float* __restrict row_penalty = penalty + static_cast<std::size_t>(row) * rays;
+    std::int32_t* __restrict row_candidate = candidate + static_cast<std::size_t>(row) * rays;
+    for (std::size_t i = 0; i < rays; ++i) {
+      const float held = row_penalty[i];
+      const float offered = moving_penalty[i];
+      const std::int32_t held_id = row_candidate[i];
+      const std::int32_t offered_id = moving[i];
+      const bool better = offered < held;
+      row_penalty[i] = better ? offered : held;
+      row_candidate[i] = better ? offered_id : held_id;
+      moving_penalty[i] = better ? held : offered;
+      moving[i] = better ? held_id : offered_id;
+    }
+  }
+}
+
+MF_VECTORIZED bool any_below(const float* a, const float* b, std::size_t count) {
+  int below = 0;
+  for (std::size_t i = 0; i < count; ++i) below |= a[i] < b[i] ? 1 : 0;
+  return below != 0;
+}
+
+}  // namespace
+
+AnsweringCamera answering_camera(const CameraModel& model) {
+  AnsweringCamera camera;
+  camera.fx = static_cast<float>(model.fx());
+  camera.fy = static_cast<float>(model.fy());
+  camera.cx = static_cast<float>(model.cx());
+  camera.cy = static_cast<float>(model.cy());
+  for (std::size_t i = 0; i < 5; ++i) camera.distortion[i] = static_cast<float>(model.parameters[4 + i]);
+  camera.distorted = model.has_distortion();
+  camera.width = static_cast<float>(model.width);
+  camera.height = static_cast<float>(model.height);
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Vector2d high = -low;
+  double largest_r2 = 0;
+  constexpr int steps = 16;  // on each side of the border, which is smooth
+  for (int i = 0; i <= steps; ++i)
+    for (const double side : {0.0, 1.0})
+      for (const bool upright : {false, true}) {
+        const double t = static_cast<double>(i) / steps;
+        const auto ray = model.unproject({(upright ? side : t) * model.width, (upright ? t : side) * model.height});
+        if (!ray) continue;
+        low = low.cwiseMin(ray->head<2>());
+        high = high.cwiseMax(ray->head<2>());
+        largest_r2 = std::max(largest_r2, ray->head<2>().squaredNorm());
+      }
+  const Eigen::Vector2d spare = (camera.distorted ? 0.01 : 1e-5) * (high - low);  // between the steps; or rounding
+  camera.left = static_cast<float>(low.x() - spare.x());
+  camera.top = static_cast<float>(low.y() - spare.y());
+  camera.right = static_cast<float>(high.x() + spare.x());
+  camera.bottom = static_cast<float>(high.y() + spare.y());
+  camera.largest_r2 = camera.distorted ? static_cast<float>(1.02 * largest_r2) : infinite;
+  return camera;
+}
+
+AnsweringView answering_view(const AnsweringCamera& camera, const Rigid3& cam_from_world, const SourceSight& sight,
+                             const Eigen::Vector3d& eye, float border) {
+  AnsweringView view;
+  view.camera = camera;
+  const Eigen::Matrix3d rotation = cam_from_world.rotation.toRotationMatrix();
+  const Eigen::Vector3d eye_in_cam = cam_from_world * eye;
+  const Eigen::Vector3d eye_from_centre = rotation.transpose() * eye_in_cam;
+  for (std::size_t i = 0; i < 9; ++i)
+    view.cam_from_world[i] = static_cast<float>(rotation(static_cast<int>(i / 3), static_cast<int>(i % 3)));
+  for (std::size_t i = 0; i < 3; ++i) {
+    view.eye_in_cam[i] = static_cast<float>(eye_in_cam[static_cast<int>(i)]);
+    view.eye_from_centre[i] = static_cast<float>(eye_from_centre[static_cast<int>(i)]);
+  }
+  view.per_border_px = 1 / std::max(1.0F, border * std::min(camera.width, camera.height));
+  view.sight = sight.empty() ? nullptr : &sight;
+  return view;
+}
+
+void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptions& options, float depth_tolerance,
+            std::span<const float> worst, const RayAnswers& out) {
+  const std::size_t count = rays.dx.size();
+  alignas(64) std::array<float, largest_bundle> inverse_depth;
+  const std::span<float> weight = out.weight;
+  if (view.camera.distorted)
+    project_distorted(view, rays, options, out, inverse_depth.data(), weight.data());
+  else
+    project_plain(view, rays, options, out, inverse_depth.data(), weight.data());
+  if (options.border == 0.5F)
+    divide_by_root(out.penalty.data(), weight.data(), count);
+  else
+    divide_by_power(out.penalty.first(count), weight.first(count), options.border);
+  if (view.sight == nullptr) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(out.penalty[i] < worst[i])) continue;
+    const float sight = sight_at(*view.sight, out.x[i], out.y[i], inverse_depth[i], depth_tolerance);
+    weight[i] *= sight;
+    out.penalty[i] = sight > 0 ? out.penalty[i] / (options.border == 0.5F ? std::sqrt(sight) : std::pow(sight, options.border)) : infinite;
+  }
+}
+
+float least_penalty(const AnsweringView& view, const Eigen::Vector3f& centre, float radius,
+                    const PenaltyOptions& options) {
+  const auto& r = view.cam_from_world;
+  const AnsweringCamera& c = view.camera;
+  const float x = r[0] * centre.x() + r[1] * centre.y() + r[2] * centre.z() + view.eye_in_cam[0];
+  const float y = r[3] * centre.x() + r[4] * centre.y() + r[5] * centre.z() + view.eye_in_cam[1];
+  const float z = r[6] * centre.x() + r[7] * centre.y() + r[8] * centre.z() + view.eye_in_cam[2];
+  // Outside of a side of the picture's pyramid by more than the radius; a side's normal is (1, −limit), not of length 1.
+  const auto outside = [&](float across, float limit) {
+    return across - limit * z > radius * std::sqrt(1 + limit * limit);
+  };
+  if (z < -radius || outside(x, c.right) || outside(-x, -c.left) || outside(y, c.bottom) || outside(-y, -c.top))
+    return infinite;
+
+  const Eigen::Vector3f from_centre = centre + Eigen::Map<const Eigen::Vector3f>(view.eye_from_centre.data());
+  const float to_view = from_centre.norm();
+  const float to_eye = centre.norm();
+  const float nearest_view = to_view - radius;
+  const float nearest_eye = to_eye - radius;
+  if (!(nearest_view > 0 && nearest_eye > 0)) return view.time_penalty;
+  // The chord u − v changes with X at a rate of at most |1/|X−C| − 1/|X−E|| + |u − v| / max(|X−C|, |X−E|).
+  const float chord = (from_centre / to_view - centre / to_eye).norm();
+  const float largest_chord = std::min(2.0F, chord + 2 * radius / std::min(nearest_view, nearest_eye));
+  const float rate = (std::abs(to_view - to_eye) + radius * largest_chord) / (nearest_view * nearest_eye) +
+                     largest_chord / std::max(nearest_view, nearest_eye);
+  return options.angle * std::max(0.0F, chord - radius * rate) + view.time_penalty;
+}
+
+void clear(const LeastPenalties& least) {
+  std::fill(least.penalty.begin(), least.penalty.end(), infinite);
+  std::fill(least.candidate.begin(), least.candidate.end(), -1);
+}
+
+void add_candidate(const LeastPenalties& least, std::int32_t candidate, std::span<const float> penalty) {
+  if (!any_below(penalty.data(), worst_of(least).data(), least.rays)) return;
+  alignas(64) std::array<float, largest_bundle> moving_penalty;
+  alignas(64) std::array<std::int32_t, largest_bundle> moving;
+  std::copy(penalty.begin(), penalty.end(), moving_penalty.begin());
+  insert(least.penalty.data(), least.candidate.data(), least.rays, least.k + 1, candidate, moving_penalty.data(),
+         moving.data());
+}
+
+}  // namespace mf

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "host/blending/ray_penalty.h"
+#include "host/io/view.h"
+#include "host/lumigraph/source_sight.h"
+
+namespace mf {
+
+inline constexpr std::size_t largest_bundle = 64;  // rays
+
+// Rays of the new view and the proxy points that they meet, by coordinate. A ray's direction has length 1 along the new
+// view's optical axis, so that `depth` is both its length's factor and the point's depth:  X = E + depth · d.
+struct RayBundle {  // at most largest_bundle rays
+  std::span<const float> dx, dy, dz;  // world
+  std::span<const float> depth;       // finite
+  std::span<const float> nx, ny, nz;  // the proxy's normal at X, unit length, either side
+  float focal2 = 1;                   // fx · fy of the new view, px²
+};
+
+// What of a photo stays the same from view to view.
+struct AnsweringCamera {
+  float fx = 1, fy = 1, cx = 0, cy = 0;
+  std::array<float, 5> distortion{};  // k1 k2 p1 p2 k3
+  bool distorted = false;
+  float width = 0, height = 0;
+  // The picture's limits in normalized coordinates, with a little to spare where the camera distorts. Beyond largest_r2
+  // the distortion's model folds back into the picture.
+  float left = 0, right = 0, top = 0, bottom = 0;
+  float largest_r2 = 0;
+};
+[[nodiscard]] AnsweringCamera answering_camera(const CameraModel&);
+
+// A photo as the rays of one new view see it: single precision suffices because everything is relative to E.
+struct AnsweringView {
+  AnsweringCamera camera;
+  std::array<float, 9> cam_from_world{};   // rotation, by rows
+  std::array<float, 3> eye_in_cam{};       // E in the photo's frame
+  std::array<float, 3> eye_from_centre{};  // E − C, world
+  float per_border_px = 1;                 // 1 / width of the soft border
+  float time_penalty = 0;                  // ≥ 0, before it is divided by the weight: taken at another time, see Moment
+  const SourceSight* sight = nullptr;      // none: the photo shows whatever lies in its picture
+};
+
+// `border` is the soft border's width as a fraction of the photo's shorter side.
+[[nodiscard]] AnsweringView answering_view(const AnsweringCamera&, const Rigid3& cam_from_world, const SourceSight&,
+                                           const Eigen::Vector3d& eye, float border);
+
+// How one photo answers for each ray of a bundle.
+struct RayAnswers {
+  std::span<float> x, y;     // photo pixels
+  std::span<float> lod;      // octaves by which the photo is finer than wanted, ≥ 0
+  std::span<float> weight;   // 0…1: soft border times sight, see RayTerms; 0: it says nothing
+  std::span<float> penalty;  // infinite where it says nothing
+};
+
+//   angle       the chord |u − v| of the unit vectors from X to E and to C: 2 sin(θ/2), exact where it counts, at 0
+//   resolution  octaves, from the areas that a patch of the proxy covers in both pictures: f² |n·(X−C)| / z³
+//   weight      the soft border, times what the photo sees of X (SourceSight)
+// Only penalties below `worst` of their ray are finished; others are at least that, without what the photo sees of X.
+// Precondition: at most largest_bundle rays.
+void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance,
+            std::span<const float> worst, const RayAnswers&);
+
+// No point within `radius` of `centre` (relative to E) gives the photo a smaller penalty; infinite when none of them
+// lies in its picture. Neither resolution nor visibility is looked at: they only raise penalties.
+[[nodiscard]] float least_penalty(const AnsweringView&, const Eigen::Vector3f& centre, float radius,
+                                  const PenaltyOptions&);
+
+// The k + 1 least penalties of each ray, in rising order, and which candidate has them. One ray a column.
+struct LeastPenalties {
+  std::span<float> penalty;         // (k + 1) rows
+  std::span<std::int32_t> candidate;  // (k + 1) rows; −1: none
+  std::size_t rays = 0;
+  int k = 1;
+};
+void clear(const LeastPenalties&);
+[[nodiscard]] inline std::span<const float> worst_of(const LeastPenalties& least) {
+  return least.penalty.subspan(static_cast<std::size_t>(least.k) * least.rays, least.rays);
+}
+void add_candidate(const LeastPenalties&, std::int32_t candidate, std::span<const float> penalty);
+
+}  // namespace mf

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/lumigraph/source_sight.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "host/lumigraph/area_average.h"
+#include "host/lumigraph/proxy_rays.h"
+
+namespace mf {
+
+namespace {
+
+constexpr int step_px = 2;            // photo pixels a texel: silhouettes are given several pixels anyway
+constexpr float code_range = 65535;
+
+// Depth along the optical axis of each texel's centre; infinite: the proxy is not there.
+ImageF depth_map(const CameraModel& camera, const Rigid3& cam_from_world, const Proxy& proxy, int width, int height) {
+  const Eigen::Matrix3f world_from_cam = cam_from_world.rotation.conjugate().toRotationMatrix().cast<float>();
+  const auto count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  std::array<std::vector<float>, 6> rays;
+  rays.fill(std::vector<float>(count));
+  const double px_x = static_cast<double>(camera.width) / width;
+  const double px_y = static_cast<double>(camera.height) / height;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto x = static_cast<double>(i % static_cast<std::size_t>(width));
+    const auto y = static_cast<double>(i / static_cast<std::size_t>(width));
+    const auto ray = camera.unproject({(x + 0.5) * px_x, (y + 0.5) * px_y});
+    const Eigen::Vector3f d = world_from_cam * ray.value_or(Eigen::Vector3d::UnitZ()).cast<float>();
+    for (std::size_t c = 0; c < 3; ++c) rays[c][i] = d[static_cast<Eigen::Index>(c)];
+  }
+  ImageF depth(width, height, 1);
+  trace(proxy,
+        {cam_from_world.inverse().translation.cast<float>(), rays[0], rays[1], rays[2], depth.data, rays[3], rays[4], rays[5]});
+  return depth;
+}
+
+// Where inverse depth bends more than any surface's does over two texels, it jumps.
+bool jumps(float a, float b, float c) {
+  constexpr float bend = 0.02F;  // of the nearest of the three; a wall's corner bends by a texel's angle, about 0.003
+  return std::abs(a + c - 2 * b) > bend * std::max({a, b, c});
+}
+
+// Distance in texels to the nearest jump, up to `reach`.
+ImageF distance_to_jumps(const ImageF& inverse, float reach) {
+  ImageF distance(inverse.width, inverse.height, 1, reach);
+  const auto mark = [&](int x, int y) { distance.at(x, y) = 0; };
+  for (int y = 0; y < inverse.height; ++y)
+    for (int x = 1; x + 1 < inverse.width; ++x)
+      if (jumps(inverse.at(x - 1, y), inverse.at(x, y), inverse.at(x + 1, y))) mark(x, y);
+  for (int y = 1; y + 1 < inverse.height; ++y)
+    for (int x = 0; x < inverse.width; ++x)
+      if (jumps(inverse.at(x, y - 1), inverse.at(x, y), inverse.at(x, y + 1))) mark(x, y);
+  // Two chamfer passes (Borgefors 1986): straight steps 1, diagonal ones √2.
+  const auto relax = [&](int x, int y, int from_x, int from_y) {
+    if (from_x < 0 || from_y < 0 || from_x >= inverse.width || from_y >= inverse.height) return;
+    const float length = from_x != x && from_y != y ? std::numbers::sqrt2_v<float> : 1.0F;
+    distance.at(x, y) = std::min(distance.at(x, y), distance.at(from_x, from_y) + length);
+  };
+  for (int y = 0; y < inverse.height; ++y)
+    for (int x = 0; x < inverse.width; ++x)
+      for (const auto& [dx, dy] : {std::pair{-1, 0}, {-1, -1}, {0, -1}, {1, -1}}) relax(x, y, x + dx, y + dy);
+  for (int y = inverse.height - 1; y >= 0; --y)
+    for (int x = inverse.width - 1; x >= 0; --x)
+      for (const auto& [dx, dy] : {std::pair{1, 0}, {1, 1}, {0, 1}, {-1, 1}}) relax(x, y, x + dx, y + dy);
+  return distance;
+}
+
+bool hides_itself(const Proxy& proxy) {
+  const auto* mesh = std::get_if<MeshProxy>(&proxy);
+  return mesh != nullptr && !mesh->surrounds;
+}
+
+std::uint16_t code(float value) {
+  return static_cast<std::uint16_t>(std::lround(code_range * std::clamp(value, 0.0F, 1.0F)));
+}
+
+void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_from_world, const Proxy& proxy, const VisibilityOptions& options) {
+  ImageF inverse = depth_map(camera, cam_from_world, proxy, sight.width, sight.height);
+  for (float& value : inverse.data) value = 1 / value;  // of infinity: 0
+  sight.scale = std::max(*std::max_element(inverse.data.begin(), inverse.data.end()),
+                         std::numeric_limits<float>::min());  // > 0 although the photo sees nothing of the proxy
+  const float reach = std::max(options.silhouette * sight.texels_per_px, 1e-3F);
+  const ImageF distance = distance_to_jumps(inverse, reach);
+  for (std::size_t i = 0; i < sight.texels.size(); ++i) {
+    const float ramp = distance.data[i] / reach;
+    sight.texels[i] = {code(inverse.data[i] / sight.scale),
+                       code(std::max(least_sight, ramp * ramp * (3 - 2 * ramp)))};
+  }
+}
+
+}  // namespace
+
+std::optional<std::string> VisibilityOptions::validate() const {
+  if (!(tolerance >= 1e-4F && tolerance <= 1)) return "tolerance: must be between 0.0001 and 1 of the depth";
+  if (!(silhouette >= 0 && silhouette <= 64)) return "silhouette: must be between 0 and 64 pixels";
+  return std::nullopt;
+}
+
+SourceSight make_sight(const CameraModel& camera, const Rigid3& cam_from_world, const ImageU8& mask, const Proxy& proxy,
+                       const VisibilityOptions& options) {
+  SourceSight sight;
+  if (!hides_itself(proxy) && mask.empty()) return sight;
+  sight.width = std::max(1, camera.width / step_px);
+  sight.height = std::max(1, camera.height / step_px);
+  sight.texels_per_px = static_cast<float>(sight.width) / static_cast<float>(camera.width);
+  sight.texels.assign(static_cast<std::size_t>(sight.width) * static_cast<std::size_t>(sight.height),
+                      {0, static_cast<std::uint16_t>(code_range)});
+  if (hides_itself(proxy)) set_depth(sight, camera, cam_from_world, proxy, options);
+  if (mask.empty()) return sight;
+  const ImageU8 small = area_average(mask, sight.width, sight.height);
+  for (std::size_t i = 0; i < sight.texels.size(); ++i)
+    sight.texels[i].trust = static_cast<std::uint16_t>(sight.texels[i].trust * small.data[i] / 255);
+  return sight;
+}
+
+}  // namespace mf

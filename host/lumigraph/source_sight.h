@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "host/lumigraph/proxy.h"
+
+namespace mf {
+
+// Which points of the proxy a photo shows.
+struct VisibilityOptions {
+  float tolerance = 0.01F;  // of the depth, 0.0001 to 1: a point this far behind the surface that a photo sees begins to
+                            // be hidden, and is hidden at twice as much
+  float silhouette = 8;     // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
+                            // inexact proxy puts colours of the foreground on the background
+
+  [[nodiscard]] std::optional<std::string> validate() const;
+};
+
+// What one photo sees of the proxy, on a grid of `step` photo pixels. Inverse depth, because that is linear in the
+// picture over any plane: between texels a plane is met exactly.
+struct SourceSight {
+  struct Texel {
+    std::uint16_t inverse_depth = 0;  // of the proxy along the optical axis, times 65535 · scale; 0: nothing there
+    std::uint16_t trust = 0;          // mask times distance from silhouettes, 0…65535
+  };
+  int width = 0;
+  int height = 0;
+  float texels_per_px = 1;
+  float scale = 0;  // inverse depth of code 65535, 1/m
+  std::vector<Texel> texels;
+
+  [[nodiscard]] bool empty() const { return texels.empty(); }
+};
+
+// Empty where the photo shows everything that lies in its picture: no mask, and a proxy that hides nothing of itself
+// from views (a plane; walls seen from inside).
+[[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask, const Proxy&,
+                                     const VisibilityOptions&);
+
+// Hidden points, and those at silhouettes, keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
+// out-voted hundreds to one elsewhere. Only a mask silences a photo.
+inline constexpr float least_sight = 2e-5F;
+
+}  // namespace mf

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/team/team.h"
+
+#include <mpi.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <deque>
+
+#include "common/check.h"
+
+namespace mf {
+
+namespace {
+
+constexpr int tile_tag = 1;
+constexpr std::size_t most_under_way = 64;                    // messages of one rank: they wait in memory
+constexpr std::size_t largest_share = std::size_t{1} << 30U;  // MPI counts in ints
+
+void must(int code) {
+  check(code == MPI_SUCCESS, "MPI works");  // by default it ends the process itself, with its own words
+}
+
+struct Sending {
+  std::string message;
+  MPI_Request request = MPI_REQUEST_NULL;
+};
+
+}  // namespace
+
+struct Team::Link {
+  std::size_t rank = 0;
+  std::size_t size = 1;
+  std::deque<Sending> under_way;  // a deque: messages stay where they are
+
+  Link() {
+    int provided = 0, number = 0;
+    must(MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided));
+    check(provided >= MPI_THREAD_SERIALIZED, "MPI can be called from several threads in turn");
+    must(MPI_Comm_rank(MPI_COMM_WORLD, &number));
+    rank = static_cast<std::size_t>(number);
+    must(MPI_Comm_size(MPI_COMM_WORLD, &number));
+    size = static_cast<std::size_t>(number);
+  }
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+  // After an error the others may wait for us for ever: then without farewell, and mpirun ends them.
+  ~Link() {
+    if (std::uncaught_exceptions() > 0) return;
+    while (!under_way.empty()) finish_first();
+    MPI_Finalize();
+  }
+  void finish_first() {
+    must(MPI_Wait(&under_way.front().request, MPI_STATUS_IGNORE));
+    under_way.pop_front();
+  }
+};
+
+Team::Team() = default;
+Team::Team(Team&&) noexcept = default;
+Team& Team::operator=(Team&&) noexcept = default;
+Team::~Team() = default;
+
+Team Team::join() {
+  Team team;
+  const char* size = std::getenv("OMPI_COMM_WORLD_SIZE");
+  if (size != nullptr && std::string(size) != "1") team.link_ = std::make_unique<Link>();
+  return team;
+}
+
+std::size_t Team::rank() const {
+  return link_ ? link_->rank : 0;
+}
+std::size_t Team::size() const {
+  return link_ ? link_->size : 1;
+}
+
+void Team::share(std::span<std::byte> bytes, std::size_t from) const {
+  if (!link_) return;
+  for (std::size_t begin = 0; begin < bytes.size(); begin += largest_share)
+    must(MPI_Bcast(bytes.data() + begin, static_cast<int>(std::min(largest_share, bytes.size() - begin)), MPI_BYTE,
+                   static_cast<int>(from), MPI_COMM_WORLD));
+}
+
+void Team::send(std::string message) {
+  check(link_ != nullptr && link_->rank > 0, "only other ranks send to rank 0");
+  if (link_->under_way.size() >= most_under_way) link_->finish_first();
+  Sending& sending = link_->under_way.emplace_back();
+  sending.message = std::move(message);
+  must(MPI_Isend(sending.message.data(), static_cast<int>(sending.message.size()), MPI_BYTE, 0, tile_tag,
+                 MPI_COMM_WORLD, &sending.request));
+}
+
+std::string Team::receive(std::size_t from) {
+  check(link_ != nullptr && link_->rank == 0, "only rank 0 receives");
+  MPI_Status status;
+  must(MPI_Probe(static_cast<int>(from), tile_tag, MPI_COMM_WORLD, &status));
+  int size = 0;
+  must(MPI_Get_count(&status, MPI_BYTE, &size));
+  std::string message(static_cast<std::size_t>(size), '\0');
+  must(MPI_Recv(message.data(), size, MPI_BYTE, static_cast<int>(from), tile_tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE));
+  return message;
+}
+
+}  // namespace mf

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+
+namespace mf {
+
+// The processes that work on one thing together, as `mpirun -n N mirrorfield …` starts them; usually one. Each has a
+// rank from 0; rank 0 writes and prints. All of them call the same functions in the same order, from one thread at a
+// time. When one dies, mpirun ends the others.
+class Team {
+ public:
+  Team();  // alone
+  Team(Team&&) noexcept;
+  Team& operator=(Team&&) noexcept;
+  ~Team();
+
+  // The team that mpirun (Open MPI) started this process in; alone, and at no cost, when it was not.
+  [[nodiscard]] static Team join();
+
+  [[nodiscard]] std::size_t rank() const;
+  [[nodiscard]] std::size_t size() const;
+  // Of tasks dealt out in turn, whether this one is ours.
+  [[nodiscard]] bool has(std::size_t task) const { return task % size() == rank(); }
+
+  // What `from` has in `bytes` everyone has afterwards. All give as many.
+  void share(std::span<std::byte> bytes, std::size_t from) const;
+
+  // From any rank to rank 0, which receives from each in the order sent. send() returns at once, unless much is under
+  // way already.
+  void send(std::string message);
+  [[nodiscard]] std::string receive(std::size_t from);
+
+ private:
+  struct Link;
+  std::unique_ptr<Link> link_;  // nothing when alone
+};
+
+// Rows of a picture that were made in turn, row y by rank y mod size: afterwards everyone has all.
+template <typename Image>
+void share_rows(const Team& team, Image& image) {
+  if (team.size() == 1) return;
+  for (int y = 0; y < image.height; ++y)
+    team.share(std::as_writable_bytes(image.row(y)), static_cast<std::size_t>(y) % team.size());
+}
+
+}  // namespace mf
