@@ -70,8 +70,7 @@ ImageF distance_to_jumps(const ImageF& inverse, float reach) {
 }
 
 bool hides_itself(const Proxy& proxy) {
-  const auto* mesh = std::get_if<MeshProxy>(&proxy);
-  return mesh != nullptr && !mesh->surrounds;
+  return std::holds_alternative<MeshProxy>(proxy);
 }
 
 std::uint16_t code(float value) {
