@@ -15,7 +15,7 @@ namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr int block_side = 16;         // pixels: photos are ranked for 256 rays at a time
-constexpr std::size_t samples = 16;    // rays that stand for a region when its bound is guessed
+constexpr std::size_t samples = 16;    // rays that stand for a tile when its bound is guessed
 constexpr float bound_slack = 1.03F;   // on the guess: fewer rays are ranked twice
 constexpr float same_ray = 1e-6F;      // radians: what single precision leaves of an angle of 0
 
@@ -25,7 +25,9 @@ class Regions {
  public:
   explicit Regions(const RayBundle& rays) {
     const auto [nearest, farthest] = std::minmax_element(rays.depth.begin(), rays.depth.end());
-    const float middle = std::sqrt(*nearest * *farthest);
+    // Not worth twice the work for a surface at a slant.
+    constexpr float parted = 1.2F;
+    const float middle = *farthest > parted * *nearest ? std::sqrt(*nearest * *farthest) : infinite;
     for (std::size_t i = 0; i < rays.depth.size(); ++i) parts_[rays.depth[i] > middle ? 1 : 0].add(rays, i);
   }
 
@@ -103,10 +105,10 @@ void TileRenderer::render(int x0, int y0) {
   shoot(x0, y0);
   const TileRays& rays = buffers_.rays;
   if (rays.size() == 0) return;
-  narrow(frame_.speaking, {0, rays.size()}, buffers_.of_tile);
+  rank_for_tile();
   for (const Region& block : blocks_) {
     if (block.first == block.end) continue;
-    narrow(buffers_.of_tile, block, buffers_.of_block);
+    bound_from_below(rays, block, buffers_.of_tile, buffers_.of_tile.bound, buffers_.of_block);
     for (std::size_t first = block.first; first < block.end; first += largest_bundle)
       choose(rays, {first, std::min(block.end, first + largest_bundle)}, buffers_.of_block);
   }
@@ -158,8 +160,10 @@ void TileRenderer::shoot_block(int x0, int y0, int x1, int y1) {
 void TileRenderer::bound_from_below(const TileRays& rays, const Region& region, const CandidateViews& from, float below,
                                     CandidateViews& to) {
   const Regions regions(rays.bundle(region.first, region.end - region.first, focal2_));
+  to.bound = below;
   to.views.clear();
   for (const CandidateView& candidate : from.views) {
+    if (candidate.least > below) break;
     const float least = regions.least(frame_.views[candidate.view], frame_.options.penalty);
     if (least < infinite && least <= below) to.views.push_back({least, candidate.view});
   }
@@ -167,17 +171,17 @@ void TileRenderer::bound_from_below(const TileRays& rays, const Region& region, 
             [](const CandidateView& a, const CandidateView& b) { return a.least < b.least; });
 }
 
-void TileRenderer::narrow(const CandidateViews& from, const Region& region, CandidateViews& to) {
+void TileRenderer::rank_for_tile() {
+  const TileRays& rays = buffers_.rays;
   TileRays& picked = buffers_.some;
   picked.resize(samples);
-  for (std::size_t i = 0; i < samples; ++i)
-    picked.copy(region.first + i * (region.end - 1 - region.first) / (samples - 1), buffers_.rays, i);
-  bound_from_below(buffers_.rays, region, from, from.bound, to);
-  rank(picked.bundle(0, samples, focal2_), to);
+  for (std::size_t i = 0; i < samples; ++i) picked.copy(i * (rays.size() - 1) / (samples - 1), rays, i);
+  CandidateViews& of_tile = buffers_.of_tile;
+  bound_from_below(rays, {0, rays.size()}, frame_.speaking, infinite, of_tile);
+  rank(picked.bundle(0, samples, focal2_), of_tile);
   const auto worst =
       worst_of({buffers_.least_penalty, buffers_.least_candidate, samples, frame_.options.penalty.k});
-  to.bound = std::min(from.bound, bound_slack * *std::max_element(worst.begin(), worst.end()));
-  while (!to.views.empty() && to.views.back().least > to.bound) to.views.pop_back();
+  of_tile.bound = bound_slack * *std::max_element(worst.begin(), worst.end());
 }
 
 // Stops at the first candidate that no ray can prefer to what it has: the rest are no better.
@@ -226,9 +230,8 @@ void TileRenderer::choose(const TileRays& rays, const Region& region, const Cand
 void TileRenderer::choose_again(float bound) {
   const TileRays& rays = buffers_.some;
   const Region region{0, rays.size()};
-  bound_from_below(rays, region, bound <= buffers_.of_tile.bound ? buffers_.of_tile : frame_.speaking, bound,
-                   buffers_.again);
-  buffers_.again.bound = infinite;
+  bound_from_below(rays, region, buffers_.of_tile, bound, buffers_.again);
+  buffers_.again.bound = infinite;  // these are all that can matter
   choose(rays, region, buffers_.again);
 }
 

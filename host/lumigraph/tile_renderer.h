@@ -45,7 +45,7 @@ struct CandidateView {
 };
 struct CandidateViews {
   std::vector<CandidateView> views;  // rising by `least`, so that ranking can stop
-  float bound = 0;                   // no other photo has a smaller penalty at any ray of the region
+  float bound = 0;                   // no photo that is missing has a smaller penalty at any ray of the region
 };
 
 // One frame of a lumigraph: what all its tiles share.
@@ -82,9 +82,10 @@ class TilePool {
 
 // Chooses the photos for the pixels of a tile.
 //
-// Photos are ranked for the tile, then for each block of it. What is dropped for a region is a photo whose penalty is
-// nowhere there below `bound`. A ray whose k + 1 best are not all below the bound is ranked again, among all photos that
-// could be better than its (k + 1)-th: so every ray gets what ranking all photos would have given it.
+// For the tile, and then for each block of it, photos are put in the order of the least penalty that any of its rays can
+// give them; rays are ranked in that order until no photo that is left can be among any ray's k + 1 best. Blocks look
+// only at photos up to the tile's bound, which some rays of it guess; a ray whose (k + 1)-th best is above the bound is
+// ranked again, up to that. So every ray gets what ranking all photos would have given it.
 class TileRenderer {
  public:
   TileRenderer(const TileFrame&, TileBuffers&, const TakeChosen&);
@@ -100,9 +101,9 @@ class TileRenderer {
 
   void shoot(int x0, int y0);
   void shoot_block(int x0, int y0, int x1, int y1);
-  // The candidates that the rays can give a penalty up to `below`, in order.
+  // The candidates that the rays can give a penalty up to `below`, in order. `from` must be of a region around them.
   void bound_from_below(const TileRays&, const Region&, const CandidateViews& from, float below, CandidateViews& to);
-  void narrow(const CandidateViews& from, const Region&, CandidateViews& to);
+  void rank_for_tile();
   void choose(const TileRays&, const Region&, const CandidateViews&);
   void choose_again(float bound);
   void rank(const RayBundle&, const CandidateViews&);
