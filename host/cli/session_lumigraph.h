@@ -22,8 +22,8 @@ namespace mf {
 [[nodiscard]] Proxy session_proxy(const std::string& name, const PhotoSet&, const std::filesystem::path& folder,
                                   const Progress&);
 
-// Surroundings as walls about the views, a vertex a degree; below the horizon as far as they are at it. What is more
-// than 50 m away is drawn there. Precondition: not the plane.
+// Surroundings as walls about the views, a vertex a degree, down to the horizon: views from behind the mirror
+// look up through the open side. What is more than 50 m away is drawn there. Precondition: not the plane.
 [[nodiscard]] TriangleMesh mesh_of(const Surroundings&);
 
 }  // namespace mf

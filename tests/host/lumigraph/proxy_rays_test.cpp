@@ -7,8 +7,6 @@
 #include <numbers>
 #include <random>
 
-#include "host/lumigraph/source_sight.h"
-
 namespace mf {
 namespace {
 
@@ -42,11 +40,12 @@ std::vector<float> distances(const Proxy& proxy, const Eigen::Vector3f& origin,
   return v[3];
 }
 
-// From inside or outside, a ray meets the wall that it crosses last, as the sphere's does; a view beyond a wall looks
+// From inside or outside, a ray meets the wall that it leaves through, as the sphere's does; a view beyond a wall looks
 // through it.
 TEST(ProxyRays, AMeshThatSurroundsIsMetLikeTheSphere) {
   const Eigen::Vector3f centre(1, -0.5F, 0.3F);
-  const Proxy walls = MeshProxy(ball_mesh(centre, 2, 200), true);
+  const Proxy walls =
+      MeshProxy(ball_mesh(centre, 2, 200), Eigen::Vector3f(centre + Eigen::Vector3f(0.5F, 0.3F, -0.2F)));
   const Proxy sphere = SphereProxy{centre, 2};
   std::mt19937 random(5);
   std::normal_distribution<float> normal;
@@ -68,13 +67,19 @@ TEST(ProxyRays, AMeshThatSurroundsIsMetLikeTheSphere) {
   }
 }
 
-TEST(ProxyRays, AMeshThatSurroundsHidesNothing) {
-  CameraModel camera;
-  camera.width = camera.height = 32;
-  camera.parameters = {30, 30, 16, 16, 0, 0, 0, 0, 0};
-  const TriangleMesh mesh = ball_mesh(Eigen::Vector3f::Zero(), 2, 20);
-  EXPECT_TRUE(make_sight(camera, {}, {}, MeshProxy(mesh, true), {}).empty());
-  EXPECT_FALSE(make_sight(camera, {}, {}, MeshProxy(mesh), {}).empty());
+// A lamp that hangs in the room is met before the wall behind it, from anywhere inside.
+TEST(ProxyRays, WhatStandsBeforeAWallIsMetFirst) {
+  TriangleMesh room = ball_mesh(Eigen::Vector3f::Zero(), 4, 100);
+  const TriangleMesh lamp = ball_mesh({0, 0, 2}, 0.3F, 60);
+  const auto first = static_cast<std::uint32_t>(room.positions.size());
+  room.positions.insert(room.positions.end(), lamp.positions.begin(), lamp.positions.end());
+  room.normals.insert(room.normals.end(), lamp.normals.begin(), lamp.normals.end());
+  room.albedo.insert(room.albedo.end(), lamp.albedo.begin(), lamp.albedo.end());
+  for (const auto& [a, b, c] : lamp.triangles) room.triangles.push_back({a + first, b + first, c + first});
+  const Proxy walls = MeshProxy(std::move(room), Eigen::Vector3f(0, 0, 0));
+  EXPECT_NEAR(distances(walls, {0, 0, 0}, {Eigen::Vector3f(0, 0, 1)})[0], 1.7F, 0.01F);
+  EXPECT_NEAR(distances(walls, {0, 0, -6}, {Eigen::Vector3f(0, 0, 1)})[0], 7.7F, 0.01F);  // through the near wall
+  EXPECT_NEAR(distances(walls, {0, 0, 0}, {Eigen::Vector3f(1, 0, 0)})[0], 4, 0.01F);
 }
 
 }  // namespace
