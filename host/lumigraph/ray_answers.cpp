@@ -132,9 +132,15 @@ MF_VECTORIZED void project_distorted(const AnsweringView& v, const RayBundle& ra
   project_all<true>(v, rays, o, out, inverse_depth, weight);
 }
 
-MF_VECTORIZED void divide(float* __restrict penalty, const float* __restrict weight, std::size_t count) {
+// penalty / weight^γ for γ = ½, whose root is a machine instruction, and for any other.
+MF_VECTORIZED void divide_by_root(float* __restrict penalty, const float* __restrict weight, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i)
-    penalty[i] = weight[i] > 0 ? penalty[i] / std::max(weight[i], 1e-20F) : infinite;
+    penalty[i] = weight[i] > 0 ? penalty[i] / std::sqrt(std::max(weight[i], 1e-20F)) : infinite;
+}
+
+void divide_by_power(std::span<float> penalty, std::span<const float> weight, float gamma) {
+  for (std::size_t i = 0; i < penalty.size(); ++i)
+    penalty[i] = weight[i] > 0 ? penalty[i] / std::pow(weight[i], gamma) : infinite;
 }
 
 MF_VECTORIZED void insert(float* __restrict penalty, std::int32_t* __restrict candidate, std::size_t rays, int rows,
@@ -217,7 +223,7 @@ AnsweringView answering_view(const AnsweringCamera& camera, const Rigid3& cam_fr
 }
 
 void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptions& options, float depth_tolerance,
-            const RayAnswers& out) {
+            std::span<const float> worst, const RayAnswers& out) {
   const std::size_t count = rays.dx.size();
   alignas(64) std::array<float, largest_bundle> inverse_depth;
   const std::span<float> weight = out.weight;
@@ -225,15 +231,17 @@ void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptio
     project_distorted(view, rays, options, out, inverse_depth.data(), weight.data());
   else
     project_plain(view, rays, options, out, inverse_depth.data(), weight.data());
-  if (view.sight != nullptr)
-    for (std::size_t i = 0; i < count; ++i)
-      if (weight[i] > 0) weight[i] *= sight_at(*view.sight, out.x[i], out.y[i], inverse_depth[i], depth_tolerance);
-  if (options.border == 1) {
-    divide(out.penalty.data(), weight.data(), count);
-    return;
+  if (options.border == 0.5F)
+    divide_by_root(out.penalty.data(), weight.data(), count);
+  else
+    divide_by_power(out.penalty.first(count), weight.first(count), options.border);
+  if (view.sight == nullptr) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!(out.penalty[i] < worst[i])) continue;
+    const float sight = sight_at(*view.sight, out.x[i], out.y[i], inverse_depth[i], depth_tolerance);
+    weight[i] *= sight;
+    out.penalty[i] = sight > 0 ? out.penalty[i] / (options.border == 0.5F ? std::sqrt(sight) : std::pow(sight, options.border)) : infinite;
   }
-  for (std::size_t i = 0; i < count; ++i)
-    out.penalty[i] = weight[i] > 0 ? out.penalty[i] / std::pow(weight[i], options.border) : infinite;
 }
 
 float least_penalty(const AnsweringView& view, const Eigen::Vector3f& centre, float radius,
@@ -270,8 +278,7 @@ void clear(const LeastPenalties& least) {
 }
 
 void add_candidate(const LeastPenalties& least, std::int32_t candidate, std::span<const float> penalty) {
-  const float* last = least.penalty.data() + static_cast<std::size_t>(least.k) * least.rays;
-  if (!any_below(penalty.data(), last, least.rays)) return;
+  if (!any_below(penalty.data(), worst_of(least).data(), least.rays)) return;
   alignas(64) std::array<float, largest_bundle> moving_penalty;
   alignas(64) std::array<std::int32_t, largest_bundle> moving;
   std::copy(penalty.begin(), penalty.end(), moving_penalty.begin());

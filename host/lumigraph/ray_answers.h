@@ -60,8 +60,10 @@ struct RayAnswers {
 //   angle       the chord |u − v| of the unit vectors from X to E and to C: 2 sin(θ/2), exact where it counts, at 0
 //   resolution  octaves, from the areas that a patch of the proxy covers in both pictures: f² |n·(X−C)| / z³
 //   weight      the soft border, times what the photo sees of X (SourceSight)
+// Only penalties below `worst` of their ray are finished; others are at least that, without what the photo sees of X.
 // Precondition: at most largest_bundle rays.
-void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance, const RayAnswers&);
+void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance,
+            std::span<const float> worst, const RayAnswers&);
 
 // No point within `radius` of `centre` (relative to E) gives the photo a smaller penalty; infinite when none of them
 // lies in its picture. Neither resolution nor visibility is looked at: they only raise penalties.
@@ -76,6 +78,9 @@ struct LeastPenalties {
   int k = 1;
 };
 void clear(const LeastPenalties&);
+[[nodiscard]] inline std::span<const float> worst_of(const LeastPenalties& least) {
+  return least.penalty.subspan(static_cast<std::size_t>(least.k) * least.rays, least.rays);
+}
 void add_candidate(const LeastPenalties&, std::int32_t candidate, std::span<const float> penalty);
 
 }  // namespace mf

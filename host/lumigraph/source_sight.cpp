@@ -87,7 +87,7 @@ void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_
   for (std::size_t i = 0; i < sight.texels.size(); ++i) {
     const float ramp = distance.data[i] / reach;
     sight.texels[i] = {code(inverse.data[i] / sight.scale),
-                       code(std::max(least_trust, ramp * ramp * (3 - 2 * ramp)))};
+                       code(std::max(least_sight, ramp * ramp * (3 - 2 * ramp)))};
   }
 }
 

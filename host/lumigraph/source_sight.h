@@ -41,11 +41,8 @@ struct SourceSight {
 [[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask, const Proxy&,
                                      const VisibilityOptions&);
 
-// Hidden points keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
+// Hidden points, and those at silhouettes, keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
 // out-voted hundreds to one elsewhere. Only a mask silences a photo.
 inline constexpr float least_sight = 2e-5F;
-// Points at silhouettes keep this much: near a silhouette of the new view every near photo has one too, and without a
-// limit photos from far around would be called instead.
-inline constexpr float least_trust = 0.05F;
 
 }  // namespace mf

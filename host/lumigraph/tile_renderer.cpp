@@ -73,7 +73,8 @@ TileRenderer::TileRenderer(const TileFrame& frame, TakeChosen take)
       take_(std::move(take)),
       focal2_(static_cast<float>(frame.view.camera.fx() * frame.view.camera.fy())),
       plain_camera_(!frame.view.camera.has_distortion()),
-      all_{{frame.speaking.begin(), frame.speaking.end()}, infinite} {
+      all_{{}, infinite} {
+  for (const std::uint32_t view : frame.speaking) all_.views.push_back({0, view});
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   least_penalty_.resize(entries);
   least_candidate_.resize(entries);
@@ -136,17 +137,19 @@ void TileRenderer::shoot_block(int x0, int y0, int x1, int y1) {
   blocks_.push_back({first, kept});
 }
 
-void TileRenderer::bound_from_below(const Rays& rays, const Region& region, const Candidates& from, Candidates& to) {
+void TileRenderer::bound_from_below(const Rays& rays, const Region& region, const Candidates& from, float below,
+                                    Candidates& to) {
   const Spheres spheres = spheres_of(rays.bundle(region.first, region.end - region.first, focal2_));
-  least_.clear();
-  for (const std::uint32_t view : from.views) {
+  to.views.clear();
+  for (const Candidate& candidate : from.views) {
     float least = infinite;
     for (const Sphere& sphere : spheres)
       if (!sphere.empty())
-        least = std::min(least, least_penalty(frame_.views[view], sphere.centre(), sphere.radius(), frame_.options.penalty));
-    if (least < infinite) least_.emplace_back(least, view);
+        least = std::min(least, least_penalty(frame_.views[candidate.view], sphere.centre(), sphere.radius(),
+                                              frame_.options.penalty));
+    if (least < infinite && least <= below) to.views.push_back({least, candidate.view});
   }
-  to.views.clear();
+  std::sort(to.views.begin(), to.views.end(), [](const Candidate& a, const Candidate& b) { return a.least < b.least; });
 }
 
 void TileRenderer::narrow(const Candidates& from, const Region& region, Candidates& to) {
@@ -154,54 +157,36 @@ void TileRenderer::narrow(const Candidates& from, const Region& region, Candidat
   picked.resize(samples);
   for (std::size_t i = 0; i < samples; ++i)
     picked.copy(region.first + i * (region.end - 1 - region.first) / (samples - 1), rays_, i);
-  const RayBundle bundle = picked.bundle(0, samples, focal2_);
-  bound_from_below(rays_, region, from, to);
-  start_ranking(samples);
-
-  // The likely best first: what they leave as bound spares most of the others.
-  const auto k = static_cast<std::size_t>(frame_.options.penalty.k);
-  const std::size_t likely = std::min(least_.size(), 4 * (k + 1));
-  std::nth_element(least_.begin(), least_.begin() + static_cast<std::ptrdiff_t>(likely), least_.end());
-  const auto rank_some = [&](std::size_t first, std::size_t end, float below) {
-    const std::size_t before = to.views.size();
-    for (std::size_t i = first; i < end; ++i)
-      if (least_[i].first < below) to.views.push_back(least_[i].second);
-    rank(bundle, std::span(to.views).subspan(before), before);
-    return bound_slack * *std::max_element(least_penalty_.begin() + static_cast<std::ptrdiff_t>(k * samples),
-                                           least_penalty_.begin() + static_cast<std::ptrdiff_t>((k + 1) * samples));
-  };
-  const float first_bound = std::min(from.bound, rank_some(0, likely, infinite));
-  to.bound = std::min(from.bound, rank_some(likely, least_.size(), first_bound));
-  to.views.clear();
-  for (const auto& [least, view] : least_)
-    if (least < to.bound) to.views.push_back(view);
+  bound_from_below(rays_, region, from, from.bound, to);
+  rank(picked.bundle(0, samples, focal2_), to);
+  const auto worst = worst_of({least_penalty_, least_candidate_, samples, frame_.options.penalty.k});
+  to.bound = std::min(from.bound, bound_slack * *std::max_element(worst.begin(), worst.end()));
+  while (!to.views.empty() && to.views.back().least > to.bound) to.views.pop_back();
 }
 
-void TileRenderer::start_ranking(std::size_t rays) {
-  clear({least_penalty_, least_candidate_, rays, frame_.options.penalty.k});
-}
-
-void TileRenderer::rank(const RayBundle& bundle, std::span<const std::uint32_t> views, std::size_t first_candidate) {
+void TileRenderer::rank(const RayBundle& bundle, const Candidates& candidates) {
   const std::size_t count = bundle.dx.size();
   const LeastPenalties least{least_penalty_, least_candidate_, count, frame_.options.penalty.k};
-  const std::size_t needed = (first_candidate + views.size()) * count;
-  for (auto* values : {&answers_x_, &answers_y_, &answers_lod_, &answers_weight_, &answers_penalty_})
-    if (values->size() < needed) values->resize(needed);
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const std::size_t c = first_candidate + i;
+  clear(least);
+  const std::span<const float> worst = worst_of(least);
+  for (std::size_t c = 0; c < candidates.views.size(); ++c) {
+    if (candidates.views[c].least > *std::max_element(worst.begin(), worst.end())) return;
+    const std::size_t needed = (c + 1) * count;
+    for (auto* values : {&answers_x_, &answers_y_, &answers_lod_, &answers_weight_, &answers_penalty_})
+      if (values->size() < needed) values->resize(2 * needed);
     const auto row = [&](std::vector<float>& values) { return std::span(values).subspan(c * count, count); };
     const RayAnswers answers{row(answers_x_), row(answers_y_), row(answers_lod_), row(answers_weight_),
                              row(answers_penalty_)};
-    answer(frame_.views[views[i]], bundle, frame_.options.penalty, frame_.depth_tolerance, answers);
+    answer(frame_.views[candidates.views[c].view], bundle, frame_.options.penalty, frame_.depth_tolerance, worst,
+           answers);
     add_candidate(least, static_cast<std::int32_t>(c), answers.penalty);
   }
 }
 
 void TileRenderer::choose(const Rays& rays, const Region& region, const Candidates& candidates) {
   const std::size_t count = region.end - region.first;
-  start_ranking(count);
-  rank(rays.bundle(region.first, count, focal2_), candidates.views, 0);
-  const float* worst = least_penalty_.data() + static_cast<std::size_t>(frame_.options.penalty.k) * count;
+  rank(rays.bundle(region.first, count, focal2_), candidates);
+  const auto worst = worst_of({least_penalty_, least_candidate_, count, frame_.options.penalty.k});
   Rays again;
   float bound = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -218,9 +203,7 @@ void TileRenderer::choose(const Rays& rays, const Region& region, const Candidat
 
 // No photo whose penalty is `bound` or more can be among a ray's k + 1 best: it has as many below already.
 void TileRenderer::choose_again(const Rays& rays, float bound) {
-  bound_from_below(rays, {0, rays.size()}, bound <= of_tile_.bound ? of_tile_ : all_, again_);
-  for (const auto& [least, view] : least_)
-    if (least <= bound) again_.views.push_back(view);
+  bound_from_below(rays, {0, rays.size()}, bound <= of_tile_.bound ? of_tile_ : all_, bound, again_);
   again_.bound = infinite;
   choose(rays, {0, rays.size()}, again_);
 }
@@ -238,7 +221,7 @@ void TileRenderer::hand_on(std::size_t count, const Candidates& candidates) {
       sum += weight_[at];
       if (candidate < 0) continue;
       const std::size_t answer_at = static_cast<std::size_t>(candidate) * count + i;
-      view_[at] = candidates.views[static_cast<std::size_t>(candidate)];
+      view_[at] = candidates.views[static_cast<std::size_t>(candidate)].view;
       x_[at] = answers_x_[answer_at];
       y_[at] = answers_y_[answer_at];
       lod_[at] = answers_lod_[answer_at];

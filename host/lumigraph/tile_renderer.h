@@ -58,9 +58,13 @@ class TileRenderer {
     void copy(std::size_t from, const Rays& source, std::size_t to);
     [[nodiscard]] RayBundle bundle(std::size_t first, std::size_t count, float focal2) const;
   };
+  struct Candidate {
+    float least = 0;  // no ray of the region gives it a smaller penalty
+    std::uint32_t view = 0;
+  };
   struct Candidates {
-    std::vector<std::uint32_t> views;
-    float bound = 0;  // no other photo has a smaller penalty at any ray of the region
+    std::vector<Candidate> views;  // rising by `least`, so that ranking can stop
+    float bound = 0;               // no other photo has a smaller penalty at any ray of the region
   };
   struct Region {  // rays [first, end) of a tile's
     std::size_t first = 0;
@@ -69,13 +73,12 @@ class TileRenderer {
 
   void shoot(int x0, int y0);
   void shoot_block(int x0, int y0, int x1, int y1);
-  // Fills least_ with what each of the candidates can have at best on the rays; drops those out of sight.
-  void bound_from_below(const Rays&, const Region&, const Candidates& from, Candidates& to);
+  // The candidates that the rays can give a penalty up to `below`, in order.
+  void bound_from_below(const Rays&, const Region&, const Candidates& from, float below, Candidates& to);
   void narrow(const Candidates& from, const Region&, Candidates& to);
   void choose(const Rays&, const Region&, const Candidates&);
   void choose_again(const Rays&, float bound);
-  void start_ranking(std::size_t rays);
-  void rank(const RayBundle&, std::span<const std::uint32_t> views, std::size_t first_candidate);
+  void rank(const RayBundle&, const Candidates&);
   void hand_on(std::size_t rays, const Candidates&);
 
   const TileFrame& frame_;
@@ -87,7 +90,6 @@ class TileRenderer {
   std::vector<Region> blocks_;   // of the rays
   Candidates all_;
   Candidates of_tile_, of_block_, again_;
-  std::vector<std::pair<float, std::uint32_t>> least_;  // a photo's least penalty in a region, and the photo
   std::vector<float> answers_x_, answers_y_, answers_lod_, answers_weight_, answers_penalty_;  // a row a candidate
   std::vector<float> least_penalty_;
   std::vector<std::int32_t> least_candidate_;
