@@ -18,6 +18,9 @@ struct ViewWeight {
   float weight = 0;  // the weights of a ray sum to 1
 };
 
+// Far below what 8 bits or a half float show beside a view that is better.
+inline constexpr float ray_weight_tie = 1e-6F;
+
 // Buehler, Bosse, McMillan, Gortler, Cohen 2001, §4.1: of the candidates the k with the least penalty speak, each with
 //
 //   w = (1 − penalty / threshold) / penalty,   threshold = the (k + 1)-th least penalty,
@@ -28,8 +31,7 @@ struct ViewWeight {
 // (k + 1)-th view fades out at its border, so that nothing jumps when it is gone.
 // Always > 0: views that tie with the threshold share what no better one takes.
 [[nodiscard]] inline float ray_weight(float penalty, float threshold, float floor) {
-  constexpr float tie = 1e-6F;  // far below what 8 bits or a half float show beside a view that is better
-  return (std::max(0.0F, 1 - (penalty + floor) / (threshold + floor)) + tie) / (penalty + floor);
+  return (std::max(0.0F, 1 - (penalty + floor) / (threshold + floor)) + ray_weight_tie) / (penalty + floor);
 }
 
 // Reorders `candidates`. Writes at most k weights into `out` (which holds k) and returns how many; 0 when none of the

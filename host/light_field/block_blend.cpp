@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "host/blending/view_weights.h"
 #include "host/light_field/half_floats.h"
 
 // One machine code for every amd64, one for those with AVX2, FMA and F16C (x86-64-v3); the loader picks. Results differ
@@ -104,18 +105,13 @@ MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes>
   // The k + 1 least penalties of every texel, rising: each candidate sinks to its place.
   const std::size_t kept = static_cast<std::size_t>(k) + 1;
   std::array<Lanes, 65> least;
-  Lanes worst{};
   for (std::size_t j = 0; j < kept; ++j)
     for (std::size_t i = 0; i < block_lanes; ++i) least[j].v[i] = infinity;
   std::size_t known = 0;
   for (const Lanes& penalty : penalties) {
     Lanes sinking = penalty;
     int better = 0;
-    for (std::size_t i = 0; i < block_lanes; ++i) {
-      const float finite = sinking.v[i] < infinity ? sinking.v[i] : 0.0F;
-      worst.v[i] = std::max(worst.v[i], finite);
-      better += sinking.v[i] < least[kept - 1].v[i] ? 1 : 0;
-    }
+    for (std::size_t i = 0; i < block_lanes; ++i) better += sinking.v[i] < least[kept - 1].v[i] ? 1 : 0;
     if (better == 0) continue;
     known = std::min(known + 1, kept);
     for (std::size_t j = 0; j < known; ++j)
@@ -128,15 +124,14 @@ MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes>
   Lanes inverse_threshold, sum{};
   for (std::size_t i = 0; i < block_lanes; ++i) {
     const float next = least[kept - 1].v[i];
-    const float threshold = (next < infinity ? next : 1.1F * worst.v[i]) + floor;
-    inverse_threshold.v[i] = 1 / (threshold + 1e-3F * floor);
+    inverse_threshold.v[i] = 1 / (std::min(next, largest) + floor) * (next < infinity ? 1.0F : 0.0F);
     confidence.v[i] = 0;
   }
   const Lanes& last = least[kept - 2];
   for (std::size_t c = 0; c < penalties.size(); ++c)
     for (std::size_t i = 0; i < block_lanes; ++i) {
       const float penalty = penalties[c].v[i] + floor;
-      const float above = std::max(0.0F, 1 - penalty * inverse_threshold.v[i]);
+      const float above = std::max(0.0F, 1 - penalty * inverse_threshold.v[i]) + ray_weight_tie;
       const float speaks = penalties[c].v[i] <= std::min(last.v[i], largest) ? 1.0F : 0.0F;
       const float weight = speaks * above / penalty;
       confidence.v[i] += speaks * view_weights[c].v[i];

@@ -85,8 +85,8 @@ EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surrou
 }
 
 EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
-                               std::vector<ShadedEmitter> emitters)
-    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)) {}
+                               std::vector<ShadedEmitter> emitters, Lit lit)
+    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)), lit_(lit) {}
 
 bool EmitterBlender::concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
   return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
@@ -114,6 +114,7 @@ Eigen::Vector4f EmitterBlender::radiance(const Eigen::Vector3f& p, const Eigen::
   thread_local std::vector<Answer> answers;  // called for every part of many cells: no allocation each time
   answers.clear();
   const ShadedEmitter* met = met_by(p, direction, 1);
+  if (met != nullptr && lit_ == Lit::no) return {0, 0, 0, 1};
   if (met != nullptr) {
     const auto visible = met->visibility(p, direction);
     if (visible) {

@@ -29,8 +29,9 @@ class EmitterBlender {
   // references to views and surroundings.
   EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::span<const Emitter>,
                  const PlaneRectangle&, const Team&);
-  // With masks that are drawn already.
-  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>);
+  // With masks that are drawn already. `Lit::no`: rays that meet an emitter are black, hidden or not.
+  enum class Lit { no, yes };
+  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>, Lit);
 
   // Whether rays within `angle_rad` of the direction may see an emitter or a ghost of one.
   [[nodiscard]] bool concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
@@ -53,6 +54,7 @@ class EmitterBlender {
   const std::vector<FieldView>& views_;
   const Surroundings& surroundings_;
   std::vector<ShadedEmitter> emitters_;
+  Lit lit_ = Lit::yes;
 };
 
 }  // namespace mf

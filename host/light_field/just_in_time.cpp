@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "common/check.h"
 #include "host/light_field/emitter_blender.h"
@@ -53,29 +54,61 @@ PlaneTile even_tile(const Rectangle& r, int texels) {
   return tile;
 }
 
-// An empty tile over the rectangle whose texel centres are those points at which the light field draws its emitters.
-PlaneTile emitter_tile(const LightField& field, const Rectangle& r) {
-  const Eigen::Vector2f low = field.plane.min_m.cast<float>();
-  const Eigen::Vector2f step = (field.plane.max_m.cast<float>() - low) *
-                               (static_cast<float>(emitter_step) / static_cast<float>(field.resolution));
-  const Eigen::Array2f first = ((r.min_m - low).array() / step.array()).floor();
-  const Eigen::Array2f last = ((r.max_m - low).array() / step.array()).ceil();
-  PlaneTile tile;
-  tile.min_m = low + ((first - 0.5F) * step.array()).matrix();
-  tile.max_m = low + ((last + 0.5F) * step.array()).matrix();
-  tile.width = static_cast<int>(last.x() - first.x()) + 1;
-  tile.height = static_cast<int>(last.y() - first.y()) + 1;
-  tile.texels.assign(static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height),
-                     Eigen::Vector4f::Zero());
-  return tile;
-}
+// Where the light field draws its emitters: at every fourth corner of its texels, counted from its top left.
+struct EmitterVertices {
+  int left, top, right, bottom;  // the first and last corners, in steps
+
+  EmitterVertices(const LightField& field, const Rectangle& r) {
+    const Eigen::Array2f step = step_of(field);
+    const Eigen::Array2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
+    left = static_cast<int>(std::floor((r.min_m.x() - low.x()) / step.x()));
+    right = std::max(left + 1, static_cast<int>(std::ceil((r.max_m.x() - low.x()) / step.x())));
+    top = static_cast<int>(std::floor((high.y() - r.max_m.y()) / step.y()));
+    bottom = std::max(top + 1, static_cast<int>(std::ceil((high.y() - r.min_m.y()) / step.y())));
+  }
+
+  static Eigen::Array2f step_of(const LightField& field) {
+    return field.plane.size_m().cast<float>().array() *
+           (static_cast<float>(emitter_step) / static_cast<float>(field.resolution));
+  }
+  // An empty tile whose texel centres are the vertices.
+  [[nodiscard]] PlaneTile tile(const LightField& field) const {
+    const Eigen::Array2f step = step_of(field);
+    const Eigen::Array2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
+    const auto at = [](int corner, float side) { return static_cast<float>(corner) + side; };
+    PlaneTile tile;
+    tile.min_m = {low.x() + at(left, -0.5F) * step.x(), high.y() - at(bottom, 0.5F) * step.y()};
+    tile.max_m = {low.x() + at(right, 0.5F) * step.x(), high.y() - at(top, -0.5F) * step.y()};
+    tile.width = right - left + 1;
+    tile.height = bottom - top + 1;
+    tile.texels.assign(static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height),
+                       Eigen::Vector4f::Zero());
+    return tile;
+  }
+  // The light field's own texels between the vertices, empty.
+  [[nodiscard]] PlaneTile texels(const LightField& field) const {
+    const Eigen::Array2f texel = step_of(field) / static_cast<float>(emitter_step);
+    const Eigen::Array2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
+    const int x0 = emitter_step * left, x1 = std::min(emitter_step * right, field.resolution);
+    const int y0 = emitter_step * top, y1 = std::min(emitter_step * bottom, field.resolution);
+    PlaneTile tile;
+    tile.min_m = {low.x() + static_cast<float>(x0) * texel.x(), high.y() - static_cast<float>(y1) * texel.y()};
+    tile.max_m = {low.x() + static_cast<float>(x1) * texel.x(), high.y() - static_cast<float>(y0) * texel.y()};
+    tile.width = x1 - x0;
+    tile.height = y1 - y0;
+    tile.texels.resize(static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height));
+    return tile;
+  }
+};
 
 // One thread's working memory: a light field of few texels, whose rectangle is the request's.
 class Worker {
  public:
-  Worker(const std::vector<FieldView>& views, const LightField& focused, const EmitterBlender& dark, int k,
-         int most_texels)
-      : views_(views), focused_(focused), dark_(dark), k_(k), most_texels_(most_texels) {
+  Worker(const std::vector<FieldView>& views, const LightField& focused, const EmitterBlender& dark,
+         const EmitterBlender& lit, int k, int most_texels)
+      : views_(views), focused_(focused), dark_(dark), lit_(lit), k_(k), most_texels_(most_texels) {
+    all_views_.resize(views.size());
+    std::iota(all_views_.begin(), all_views_.end(), 0U);
     part_.directions = focused.directions;
     part_.surroundings.centre_in_world = focused.surroundings.centre_in_world;
     part_.surroundings.inverse_distance = focused.surroundings.inverse_distance;
@@ -85,7 +118,8 @@ class Worker {
     const Rectangle where = inside(focused_, request);
     part_.resolution = texels_for(where);
     PlaneTile smooth = even_tile(where, part_.resolution);
-    PlaneTile emitted = emitter_tile(focused_, where);
+    const EmitterVertices vertices(focused_, where);
+    PlaneTile emitted = vertices.tile(focused_);
     of_cell_ = smooth;
     part_.plane = {focused_.plane.world_from_plane, smooth.min_m.cast<double>(), smooth.max_m.cast<double>()};
     TileResampler resampler(views_, part_, dark_, k_);
@@ -99,11 +133,14 @@ class Worker {
       any_emitter = add_emitters(cell, share, emitted) || any_emitter;
     }
     if (!any_emitter) return smooth;
-    for (int y = 0; y < emitted.height; ++y)
-      for (int x = 0; x < emitted.width; ++x)
-        emitted.texels[static_cast<std::size_t>(y * emitted.width + x)] +=
-            sample(smooth.image(), emitted.position(x, y));
-    return emitted;
+    PlaneTile both = vertices.texels(focused_);
+    for (int y = 0; y < both.height; ++y)
+      for (int x = 0; x < both.width; ++x) {
+        const Eigen::Vector2f at = both.position(x, y);
+        both.texels[static_cast<std::size_t>(y * both.width + x)] =
+            sample(smooth.image(), at) + sample(emitted.image(), at);
+      }
+    return both;
   }
 
  private:
@@ -118,13 +155,15 @@ class Worker {
   // Adds share · (the emitters' light, mean over the cell). Returns whether there is any.
   bool add_emitters(std::uint32_t cell, float share, PlaneTile& emitted);
 
-  // Light of the emitters whose masks are known, integrated over the cell, as seen from p (world), and the solid angle
-  // of the parts that they fill.
-  [[nodiscard]] Eigen::Vector4f emitted_at(const Eigen::Vector3f& p) const;
+  // Light of the emitters, integrated over the cell, as seen from p (world), and the solid angle of the parts that they
+  // fill.
+  [[nodiscard]] Eigen::Vector4f emitted_at(const Eigen::Vector3f& p, float part_angle) const;
 
   const std::vector<FieldView>& views_;
   const LightField& focused_;
   const EmitterBlender& dark_;
+  const EmitterBlender& lit_;
+  std::vector<std::uint32_t> all_views_;
   int k_;
   int most_texels_;
   LightField part_;
@@ -132,17 +171,13 @@ class Worker {
   std::vector<CellSample> parts_;  // of the cell at hand, directions in the world
 };
 
-Eigen::Vector4f Worker::emitted_at(const Eigen::Vector3f& p) const {
+Eigen::Vector4f Worker::emitted_at(const Eigen::Vector3f& p, float part_angle) const {
   Eigen::Vector4f sum = Eigen::Vector4f::Zero();
-  for (const CellSample& part : parts_)
-    for (const ShadedEmitter& e : focused_.emitters) {
-      if (!e.met_at(p, part.direction)) continue;
-      if (const auto visible = e.visibility(p, part.direction)) {
-        sum.head<3>() += part.solid_angle_sr * *visible * e.radiance;
-        sum.w() += part.solid_angle_sr;
-      }
-      break;  // the light field, too, lets the first that a ray meets speak
-    }
+  for (const CellSample& part : parts_) {
+    if (!lit_.unhidden(p, part.direction)) continue;
+    const Eigen::Vector4f seen = lit_.radiance(p, part.direction, part_angle, all_views_);
+    sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+  }
   return sum;
 }
 
@@ -169,7 +204,7 @@ bool Worker::add_emitters(std::uint32_t cell, float share, PlaneTile& emitted) {
         parts_ = split_cell(part_.directions, cell, emitter_splits);
         for (CellSample& part : parts_) part.direction = turn * part.direction;
       }
-      const Eigen::Vector4f light = emitted_at(p) / solid_angle;
+      const Eigen::Vector4f light = emitted_at(p, angle / std::sqrt(static_cast<float>(parts_.size()))) / solid_angle;
       // As the light field has it: a cell's colour is the mean over what was seen of the cell.
       const float seen = std::max(sample(of_cell_.image(), at).w(), light.w());
       if (seen > 0)
@@ -212,11 +247,11 @@ std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views
                                              std::span<const TileRequest> requests, const JustInTimeOptions& options) {
   check(options.most_texels >= 8 && options.most_texels % 8 == 0, "a multiple of 8 texels");
   if (focused.surroundings.is_plane()) return over_the_plane(views, focused, k, requests, options.most_texels);
-  // The emitters without their light: rays that meet them are black, and views that show their glare have no say.
-  std::vector<ShadedEmitter> dark_emitters = focused.emitters;
-  for (ShadedEmitter& e : dark_emitters) e.radiance.setZero();
-  const EmitterBlender dark(views, focused.surroundings, std::move(dark_emitters));
-  tbb::enumerable_thread_specific<Worker> workers([&] { return Worker(views, focused, dark, k, options.most_texels); });
+  // Once without the emitters' light, where views that show their glare have no say, and once for that light alone.
+  const EmitterBlender dark(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no);
+  const EmitterBlender lit(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::yes);
+  tbb::enumerable_thread_specific<Worker> workers(
+      [&] { return Worker(views, focused, dark, lit, k, options.most_texels); });
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(),
                     [&](std::size_t i) { tiles[i] = workers.local().fill(requests[i]); });

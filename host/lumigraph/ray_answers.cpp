@@ -93,12 +93,14 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
     const float cos_view = larger(std::abs(nx[i] * wx + ny[i] * wy + nz[i] * wz) * per_view, edge_on_cosine);
     const float cos_ray = larger(std::abs(nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]) * per_ray, edge_on_cosine);
     // Areas: f² cos |X−C| / z³, and for the new view with |X−E| = depth · |d|, z = depth.
-    const float area_ratio = focal2_ratio * (cos_ray * per_view * zc * zc * zc) / (per_ray * cos_view * depth[i] * depth[i]);
+    const float area_ratio =
+        focal2_ratio * (cos_ray * per_view * zc * zc * zc) / (per_ray * cos_view * depth[i] * depth[i]);
     const float octaves = 0.5F * approximate_log2(before ? area_ratio : 1.0F);
 
     const float to_side = smaller(u, c.width - u) * per_border_px;
     const float to_top = smaller(w, c.height - w) * per_border_px;
     const bool inside = before & (r2 < c.largest_r2);
+    // Squared: where a photo that outweighs the others leaves them, it leaves gently even under a root (γ = 0.5).
     const float border = smooth(to_side) * smooth(to_top);
 
     out_x[i] = u;
@@ -106,13 +108,13 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
     out_lod[i] = larger(-octaves, 0.0F);
     plain[i] = alpha * chord + beta * larger(octaves, 0.0F) + of_time;
     inverse_depth[i] = inverse;
-    weight[i] = inside ? border : 0.0F;
+    weight[i] = inside ? border * border : 0.0F;
   }
 }
 
 // Multiplies the weights by what the photo sees of points at these inverse depths: between four texels.
-MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, const float* inverse_depth, float tolerance,
-                        std::size_t count) {
+MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, const float* inverse_depth,
+                        float tolerance, std::size_t count) {
   const float* x = answers.x.data();
   const float* y = answers.y.data();
   float* weight = answers.weight.data();
@@ -139,7 +141,9 @@ MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, con
     const std::uint32_t t10 = texels[at + below];
     const std::uint32_t t11 = texels[at + below + right];
     const auto upper = [](std::uint32_t texel) { return static_cast<float>(static_cast<std::int32_t>(texel >> 16U)); };
-    const auto lower = [](std::uint32_t texel) { return static_cast<float>(static_cast<std::int32_t>(texel & 0xFFFFU)); };
+    const auto lower = [](std::uint32_t texel) {
+      return static_cast<float>(static_cast<std::int32_t>(texel & 0xFFFFU));
+    };
     const float surface_top = upper(t00) + a * (upper(t01) - upper(t00));
     const float surface_bottom = upper(t10) + a * (upper(t11) - upper(t10));
     const float trust_top = lower(t00) + a * (lower(t01) - lower(t00));
@@ -147,7 +151,8 @@ MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, con
     const float surface = scale * (surface_top + b * (surface_bottom - surface_top));
     const float trust = (trust_top + b * (trust_bottom - trust_top)) / 65535;
     const float behind = surface / inverse_depth[i] - 1;  // of the point's depth: 0 on the surface
-    weight[i] *= trust * larger(least_sight, 1 - smooth(behind * per_tolerance - 1));
+    const float sees = smooth(trust) * (1 - smooth(behind * per_tolerance - 1));
+    weight[i] *= trust > 0 ? larger(least_sight, sees) : 0.0F;
   }
 }
 
@@ -183,8 +188,8 @@ void divide(std::span<const float> plain, std::span<const float> weight, float g
     penalty[i] = weight[i] > 0 ? plain[i] / std::pow(weight[i], gamma) : infinite;
 }
 
-MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t rays, int rows,
-                          std::int32_t id, float* moving_penalty, std::int32_t* moving) {
+MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t rays, int rows, std::int32_t id,
+                          float* moving_penalty, std::int32_t* moving) {
   for (std::size_t i = 0; i < rays; ++i) moving[i] = id;
   for (int row = 0; row < rows; ++row) {
     float* row_penalty = penalty + static_cast<std::size_t>(row) * rays;
@@ -281,7 +286,8 @@ float least_penalty(const AnsweringView& view, const RaysRegion& region, const P
   const float x = r[0] * centre.x() + r[1] * centre.y() + r[2] * centre.z() + view.eye_in_cam[0];
   const float y = r[3] * centre.x() + r[4] * centre.y() + r[5] * centre.z() + view.eye_in_cam[1];
   const float z = r[6] * centre.x() + r[7] * centre.y() + r[8] * centre.z() + view.eye_in_cam[2];
-  // Outside of a side of the picture's pyramid by more than the radius; a side's normal is (1, −limit), not of length 1.
+  // Outside of a side of the picture's pyramid by more than the radius; a side's normal is (1, −limit), not of
+  // length 1.
   const auto outside = [&](float across, float limit) {
     return across - limit * z > radius * std::sqrt(1 + limit * limit);
   };
@@ -307,7 +313,8 @@ float least_penalty(const AnsweringView& view, const RaysRegion& region, const P
   const float area_ratio =
       region.least_area * nearest_z * nearest_z * nearest_z / (c.fx * c.fy * (to_view + radius) * cosines);
   constexpr float slip = 1e-4F;  // octaves: above the approximation of the logarithm
-  return angle_and_time + options.resolution * std::max(0.0F, 0.5F * approximate_log2(std::max(area_ratio, 1e-30F)) - slip);
+  return angle_and_time +
+         options.resolution * std::max(0.0F, 0.5F * approximate_log2(std::max(area_ratio, 1e-30F)) - slip);
 }
 
 MF_VECTORIZED bool any_reaches(std::span<const float> penalty, float bound) {

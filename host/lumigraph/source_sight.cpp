@@ -14,8 +14,9 @@ namespace mf {
 
 namespace {
 
-constexpr int step_px = 2;            // photo pixels a texel: silhouettes are given several pixels anyway
+constexpr int step_px = 2;  // photo pixels a texel: silhouettes are given several pixels anyway
 constexpr float code_range = 65535;
+constexpr float least_trust = 1e-4F;  // smoothed it is nothing, but only a mask takes all
 
 // Depth along the optical axis of each texel's centre; infinite: the proxy is not there.
 ImageF depth_map(const CameraModel& camera, const Rigid3& cam_from_world, const Proxy& proxy, int width, int height) {
@@ -33,8 +34,8 @@ ImageF depth_map(const CameraModel& camera, const Rigid3& cam_from_world, const 
     for (std::size_t c = 0; c < 3; ++c) rays[c][i] = d[static_cast<Eigen::Index>(c)];
   }
   ImageF depth(width, height, 1);
-  trace(proxy,
-        {cam_from_world.inverse().translation.cast<float>(), rays[0], rays[1], rays[2], depth.data, rays[3], rays[4], rays[5]});
+  trace(proxy, {cam_from_world.inverse().translation.cast<float>(), rays[0], rays[1], rays[2], depth.data, rays[3],
+                rays[4], rays[5]});
   return depth;
 }
 
@@ -77,7 +78,8 @@ std::uint32_t code(float value) {
   return static_cast<std::uint32_t>(std::lround(code_range * std::clamp(value, 0.0F, 1.0F)));
 }
 
-void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_from_world, const Proxy& proxy, const VisibilityOptions& options) {
+void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_from_world, const Proxy& proxy,
+               const VisibilityOptions& options) {
   ImageF inverse = depth_map(camera, cam_from_world, proxy, sight.width, sight.height);
   for (float& value : inverse.data) value = 1 / value;  // of infinity: 0
   sight.scale = std::max(*std::max_element(inverse.data.begin(), inverse.data.end()),
@@ -85,9 +87,8 @@ void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_
   const float reach = std::max(options.silhouette * sight.texels_per_px, 1e-3F);
   const ImageF distance = distance_to_jumps(inverse, reach);
   for (std::size_t i = 0; i < sight.texels.size(); ++i) {
-    const float ramp = distance.data[i] / reach;
-    sight.texels[i] = SourceSight::texel(code(inverse.data[i] / sight.scale),
-                                         code(std::max(least_sight, ramp * ramp * (3 - 2 * ramp))));
+    const float trust = std::max(distance.data[i] / reach, least_trust);
+    sight.texels[i] = SourceSight::texel(code(inverse.data[i] / sight.scale), code(trust));
   }
 }
 

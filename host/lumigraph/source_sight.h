@@ -12,10 +12,10 @@ namespace mf {
 
 // Which points of the proxy a photo shows.
 struct VisibilityOptions {
-  float tolerance = 0.01F;  // of the depth, 0.0001 to 1: a point this far behind the surface that a photo sees begins to
-                            // be hidden, and is hidden at twice as much
-  float silhouette = 8;     // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
-                            // inexact proxy puts colours of the foreground on the background
+  float tolerance = 0.01F;  // of the depth, 0.0001 to 1: a point this far behind the surface that a photo sees begins
+                            // to be hidden, and is hidden at twice as much
+  float silhouette = 8;  // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
+                         // inexact proxy puts colours of the foreground on the background
 
   [[nodiscard]] std::optional<std::string> validate() const;
 };
@@ -24,7 +24,8 @@ struct VisibilityOptions {
 // picture over any plane: between texels a plane is met exactly.
 struct SourceSight {
   // Upper half: inverse depth of the proxy along the optical axis, 65535 at `scale`; 0: nothing there. Lower half:
-  // mask times distance from silhouettes, 65535 is full trust. One word, so that one load brings both.
+  // trust, mask times distance from silhouettes, 65535 at all of both. One word, so that one load brings both. Trust is
+  // smoothed between texels, not in them: bilinear it would rise from 0 with a bend.
   using Texel = std::uint32_t;
   [[nodiscard]] static Texel texel(std::uint32_t inverse_depth, std::uint32_t trust) {
     return inverse_depth << 16U | trust;
@@ -40,11 +41,11 @@ struct SourceSight {
 
 // Empty where the photo shows everything that lies in its picture: no mask, and a proxy that hides nothing of itself
 // from views (a plane; walls seen from inside).
-[[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask, const Proxy&,
-                                     const VisibilityOptions&);
+[[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask,
+                                     const Proxy&, const VisibilityOptions&);
 
-// Hidden points, and those at silhouettes, keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
-// out-voted hundreds to one elsewhere. Only a mask silences a photo.
+// Hidden points, and those at silhouettes, keep this much weight: they speak where no photo has anything better, rather
+// than leave a hole, and are out-voted hundreds to one elsewhere. Only a mask silences a photo.
 inline constexpr float least_sight = 2e-5F;
 
 }  // namespace mf
