@@ -229,6 +229,15 @@ void describe(const ShadedEmitter& e, Imf::Header& header) {
   header.insert("mfMaskMax", Imf::V2fAttribute({e.mask_max_m.x(), e.mask_max_m.y()}));
 }
 
+// What the map of distances is a picture of, where that has a shape of its own.
+void describe_shape(const Surroundings& s, Imf::Header& header) {
+  if (s.box) {
+    header.insert("mfBoxMin", Imf::V2fAttribute({s.box->low.x(), s.box->low.y()}));
+    header.insert("mfBoxMax", Imf::V3fAttribute({s.box->high.x(), s.box->high.y(), s.box->ceiling}));
+  }
+  if (!s.mesh_file.empty()) header.insert("mfMesh", Imf::StringAttribute(s.mesh_file));
+}
+
 // All parts of a file share the display window: the field's.
 Imf::Header header_of(const NamedMap& map, const Surroundings& s, const Imath::Box2i& display_window) {
   Imf::Header header(display_window, Imath::Box2i({0, 0}, {map.map->width - 1, map.map->height - 1}));
@@ -239,6 +248,7 @@ Imf::Header header_of(const NamedMap& map, const Surroundings& s, const Imath::B
   for (const char* channel : map.channels) header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
   header.insert("mfCentre", Imf::V3fAttribute({s.centre_in_world.x(), s.centre_in_world.y(), s.centre_in_world.z()}));
   if (map.emitter != nullptr) describe(*map.emitter, header);
+  if (map.map == &s.inverse_distance) describe_shape(s, header);
   return header;
 }
 
@@ -288,13 +298,24 @@ ShadedEmitter emitter_of(const Imf::Header& header, const std::string& path) {
   return e;
 }
 
+void read_shape(const Imf::Header& header, Surroundings& s) {
+  const auto* low = header.findTypedAttribute<Imf::V2fAttribute>("mfBoxMin");
+  const auto* high = header.findTypedAttribute<Imf::V3fAttribute>("mfBoxMax");
+  if (low != nullptr && high != nullptr)
+    s.box = RoomBox{{low->value().x, low->value().y}, {high->value().x, high->value().y}, high->value().z};
+  if (const auto* mesh = header.findTypedAttribute<Imf::StringAttribute>("mfMesh")) s.mesh_file = mesh->value();
+}
+
 void read_maps(Imf::MultiPartInputFile& file, LightField& field, const std::string& path) {
   Surroundings& s = field.surroundings;
   for (int part = 1; part < file.parts(); ++part) {
     const std::string name = file.header(part).name();
     const Imath::V3f& centre = attribute<Imf::V3fAttribute>(file.header(part), "mfCentre", path);
     s.centre_in_world = {centre.x, centre.y, centre.z};
-    if (name == "inverseDistance") s.inverse_distance = read_map(file, part, {"Y"});
+    if (name == "inverseDistance") {
+      s.inverse_distance = read_map(file, part, {"Y"});
+      read_shape(file.header(part), s);
+    }
     if (name == "distanceConfidence") s.confidence = read_map(file, part, {"Y"});
     if (name == "panorama") s.panorama = read_map(file, part, {"R", "G", "B", "A"});
     if (!name.starts_with("emitter")) continue;

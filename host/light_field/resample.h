@@ -10,6 +10,7 @@
 #include "common/progress.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/provenance.h"
 #include "host/light_field/surroundings_search.h"
 
 namespace mf {
@@ -19,9 +20,16 @@ struct ResampleOptions {
   int directions = 2500;  // about how many, over the hemisphere; ≥ 11
   int size = 128;         // texels along each side of the rectangle; 2 to 1024
   // What the views are focused on. auto: a distance per direction by photo-consistency; sphere: one sphere whose radius
-  // photo-consistency chooses; sphere:R (metres); sphere:inf; plane: the light-field plane itself (the paper's).
+  // photo-consistency chooses; sphere:R (metres); sphere:inf; box: a room whose sides it chooses; box:X0,Y0,X1,Y1,H
+  // (world metres); mesh:FILE (world coordinates); plane: the light-field plane itself (the paper's).
   std::string proxy = "auto";
   int k = 0;  // views blended for a ray; 0: 15 for the plane (the paper's), 6 else; 1 to 64
+  // Buehler's penalty (host/blending/ray_penalty.h): β in metres of ray distance (plane: radians) per octave of missing
+  // resolution, ≥ 0; γ > 0, how strongly views are shunned near their border. α, the unit of both, is 1.
+  double resolution = 0;
+  double border = 1;
+  bool fill = true;         // give texels that no view saw a guess, at confidence 0; else they stay black
+  bool provenance = false;  // also tell which frames lit which texels
   std::optional<std::array<double, 4>> rectangle;  // x0 y0 x1 y1 in world metres; else from the mirror's openings
 
   // What is wrong, in words that name the field; nothing when all is well.
@@ -34,6 +42,8 @@ struct ResampleResult {
   std::map<std::string, double> seconds;   // by stage
   std::size_t views = 0;
   double mean_confidence = 0;  // cosine-weighted over directions, mean over the plane
+  double filled_share = 0;     // of the texels: those that no view saw, if they were given a guess
+  std::optional<Provenance> provenance;  // when asked for; frames without names
 };
 
 // The views resampled into L(p, ω) on a plane parallel to the ground (Ihrke et al. 2008, §4.3), each ray blended from

@@ -24,17 +24,17 @@ constexpr float same_ray = 1e-4F;         // metres (plane proxy: radians): rays
 }  // namespace
 
 TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field,
-                             const EmitterBlender& emitters, int k)
+                             const EmitterBlender& emitters, const PenaltyOptions& penalty)
     : views_(views),
       field_(field),
       emitters_(emitters),
-      k_(k),
+      penalty_(penalty),
       blocks_((field.resolution + block_step - 1) / block_step),
       vertices_(blocks_ * block_vertices + 1),
       vertex_(static_cast<std::size_t>(vertices_ * vertices_)),
       best_views_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))),
       mark_(views.size(), 0),
-      weights_(static_cast<std::size_t>(k)) {}
+      weights_(static_cast<std::size_t>(penalty.k)) {}
 
 void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
   prepare(direction);
@@ -149,10 +149,18 @@ ProxyPoint TileResampler::focus(const Eigen::Vector3f& p) const {
 }
 
 // Plane as proxy: the angle between the wanted and the captured ray. Else: how far the captured ray passes by.
-float TileResampler::penalty(const FieldView& view, const Eigen::Vector3f& p, const ProxyPoint& x) const {
-  if (!field_.surroundings.is_plane()) return ray_distance(p, x, view.centre_in_world);
+float TileResampler::penalty(const FieldView& view, const Eigen::Vector3f& p, const ProxyPoint& x,
+                             float weight) const {
   const Eigen::Vector3f ray = ray_to(x, view.centre_in_world);
-  return std::atan2(ray.cross(cell_.direction).norm(), ray.dot(cell_.direction));
+  RayTerms terms;
+  terms.weight = weight;
+  terms.angle = field_.surroundings.is_plane() ? std::atan2(ray.cross(cell_.direction).norm(), ray.dot(cell_.direction))
+                                               : ray_distance(p, x, view.centre_in_world);
+  if (penalty_.resolution > 0) {
+    const float pixels = cell_.part_angle_rad / ray.norm() * view.focal_px;
+    terms.resolution = coarseness(pixels * pixels, 1);
+  }
+  return penalty_of(penalty_, terms);
 }
 
 void TileResampler::rank_views(int corner_x, int corner_y) {
@@ -164,10 +172,10 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     if (pixel.z() <= 0) continue;
     const int level = field_.surroundings.is_plane() ? 0 : level_for_angle(views_[i], v.focus, cell_.angle_rad);
     const float weight = views_[i].fetch(level, pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
-    if (weight >= smallest_weight) ranked_.push_back({i, penalty(views_[i], v.p, v.focus) / weight});
+    if (weight >= smallest_weight) ranked_.push_back({i, penalty(views_[i], v.p, v.focus, weight)});
   }
   const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
-  const std::size_t kept = std::min(static_cast<std::size_t>(k_) + spare, ranked_.size());
+  const std::size_t kept = std::min(static_cast<std::size_t>(penalty_.k) + spare, ranked_.size());
   std::partial_sort(ranked_.begin(), ranked_.begin() + static_cast<std::ptrdiff_t>(kept), ranked_.end(),
                     [](const ViewPenalty& a, const ViewPenalty& b) { return a.penalty < b.penalty; });
   auto& best = best_views_[static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x)];
@@ -242,11 +250,10 @@ Eigen::Vector4f TileResampler::blend(int x, int y) {
   for (std::uint32_t c = 0; c < candidates_.size(); ++c) {
     const Eigen::Vector4f* at = &seen_[c * patch * patch + static_cast<std::size_t>(j * patch + i)];
     seen_here_[c] = interpolate(at[0], at[1], at[patch], at[patch + 1]);
-    // The penalty over the field-of-view weight: it grows without bound towards the view's border.
     if (seen_here_[c].w() >= smallest_weight)
-      ranked_.push_back({c, penalty(views_[candidates_[c]], p, x_focus) / seen_here_[c].w()});
+      ranked_.push_back({c, penalty(views_[candidates_[c]], p, x_focus, seen_here_[c].w())});
   }
-  const std::size_t speaking = blend_weights(ranked_, k_, same_ray, weights_);
+  const std::size_t speaking = blend_weights(ranked_, penalty_.k, same_ray, weights_);
   Eigen::Vector4f colour = Eigen::Vector4f::Zero();
   float confidence = 0;
   for (std::size_t s = 0; s < speaking; ++s) {

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "host/blending/ray_penalty.h"
 #include "host/blending/view_weights.h"
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
@@ -23,7 +24,8 @@ namespace mf {
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
-  TileResampler(const std::vector<FieldView>& views, const LightField& field, const EmitterBlender& emitters, int k);
+  TileResampler(const std::vector<FieldView>& views, const LightField& field, const EmitterBlender& emitters,
+                const PenaltyOptions&);
 
   // Precondition: `tile` holds resolution² texels.
   void fill(std::size_t direction, Eigen::Vector4f* tile);
@@ -53,13 +55,13 @@ class TileResampler {
 
   [[nodiscard]] Eigen::Vector3f point(float texel_x, float texel_y) const;
   [[nodiscard]] ProxyPoint focus(const Eigen::Vector3f& p) const;
-  [[nodiscard]] float penalty(const FieldView&, const Eigen::Vector3f& p, const ProxyPoint&) const;
+  [[nodiscard]] float penalty(const FieldView&, const Eigen::Vector3f& p, const ProxyPoint&, float weight) const;
   [[nodiscard]] Eigen::Vector4f fetch_cell(const FieldView&, const Vertex&) const;
 
   const std::vector<FieldView>& views_;
   const LightField& field_;
   const EmitterBlender& emitters_;
-  int k_;
+  PenaltyOptions penalty_;
   int blocks_;    // along a side
   int vertices_;  // along a side
 
