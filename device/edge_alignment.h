@@ -20,8 +20,8 @@ using QuadCorners = std::array<Eigen::Vector2d, 4>;
 // compute, is pulled by noise far from the edge, most of all in mono frames, which no filter smooths.)
 //
 // `start`: in the order of TagDetection::corners_px, within `reach_px` of the edges. `reach_px`: how far to both sides
-// to look, 1 or more, less than the white border and the dark one are wide. Nothing when an edge cannot be seen or the corners
-// move by more than twice the reach.
+// to look, 1 or more, less than the white border and the dark one are wide. Nothing when an edge cannot be seen or the
+// corners move by more than twice the reach.
 [[nodiscard]] std::optional<QuadCorners> align_edges(const ImageF& linear, const QuadCorners& start, double reach_px);
 
 }  // namespace mf

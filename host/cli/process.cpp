@@ -18,6 +18,7 @@
 #include "host/io/image_file.h"
 #include "host/light_field/probe.h"
 #include "host/photometry/photometry.h"
+#include "host/report/field_pictures.h"
 #include "host/report/report.h"
 
 namespace mf {

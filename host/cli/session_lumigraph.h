@@ -17,13 +17,13 @@ namespace mf {
                                            const Progress&);
 
 // What a session's rays come from, by name: "auto" finds a distance per direction as resample does; NAME.lf.exr takes
-// what a light field was focused on; else as make_proxy(). A session's masks are the mirror's opening, no silhouettes:
+// what a light field was focused on; else as make_proxy(), a mesh as walls about the views. A session's masks are the mirror's opening, no silhouettes:
 // "hull" is refused. Throws InputError.
 [[nodiscard]] Proxy session_proxy(const std::string& name, const PhotoSet&, const std::filesystem::path& folder,
                                   const Progress&);
 
-// Surroundings as walls about the views, a vertex a degree; below the horizon as far as they are at it. What is more
-// than 50 m away is drawn there. Precondition: not the plane.
+// Surroundings as walls about the views, a vertex a degree, down to the horizon: views from behind the mirror
+// look up through the open side. What is more than 50 m away is drawn there. Precondition: not the plane.
 [[nodiscard]] TriangleMesh mesh_of(const Surroundings&);
 
 }  // namespace mf

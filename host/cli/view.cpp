@@ -99,7 +99,8 @@ void run(const ViewArguments& a) {
 }  // namespace
 
 void add_view_command(CommandLine& program) {
-  CommandLine command = program.command("view", "look into a light field, or from between posed photos, in a window");
+  CommandLine command =
+      program.command("view", "a window into a light field, a session, or the space between posed photos");
   const auto a = std::make_shared<ViewArguments>();  // shared: the parser's callback outlives this function
   command.option("shown", a->shown, "light field (.lf.exr), or a session's folder");
   command.option("--height", a->height_m, "session: of the plane above the world's ground, metres");

@@ -144,7 +144,8 @@ MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes>
       penalties[c].v[i] = weight;
     }
   for (std::size_t i = 0; i < block_lanes; ++i) {
-    sum.v[i] = 1 / std::max(sum.v[i], std::numeric_limits<float>::min());
+    constexpr float nobody = 1e-30F;  // where no view speaks, 0 times this one's inverse is still 0
+    sum.v[i] = 1 / std::max(sum.v[i], nobody);
     confidence.v[i] = std::min(confidence.v[i], 1.0F);
   }
   for (std::size_t c = 0; c < penalties.size(); ++c)

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/lumigraph/lumigraph.h"
 
-#include <tbb/blocked_range2d.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <numeric>
 
@@ -76,12 +75,11 @@ void blend_colours(const ChosenViews& chosen, ImageU8& picture, ImageU8& covered
   });
 }
 
-void render_tiles(const TileFrame& frame, const TakeChosen& take) {
-  tbb::enumerable_thread_specific<TileRenderer> renderers([&] { return TileRenderer(frame, take); });
+void render_tiles(const TileFrame& frame, const TakeChosen& take, TilePool& pool) {
   const int columns = (frame.view.camera.width + tile_side - 1) / tile_side;
   const int rows = (frame.view.camera.height + tile_side - 1) / tile_side;
   tbb::parallel_for(0, columns * rows, [&](int tile) {
-    renderers.local().render(tile % columns * tile_side, tile / columns * tile_side);
+    TileRenderer(frame, pool.local(), take).render(tile % columns * tile_side, tile / columns * tile_side);
   });
 }
 
@@ -96,7 +94,10 @@ std::optional<std::string> LumigraphOptions::validate() const {
 }
 
 Lumigraph::Lumigraph(const PhotoSet& set, Proxy proxy, const VisibilityOptions& visibility, const Progress& progress)
-    : pyramids_(make_pyramids(set)), proxy_(std::move(proxy)), visibility_(visibility) {
+    : pyramids_(make_pyramids(set)),
+      proxy_(std::move(proxy)),
+      visibility_(visibility),
+      pool_(std::make_unique<TilePool>()) {
   for (const PosedPhoto& photo : set.photos) {
     sources_.push_back({photo.name, photo.camera, photo.cam_from_world, photo.time_s});
     masks_.push_back(photo.mask);
@@ -104,6 +105,10 @@ Lumigraph::Lumigraph(const PhotoSet& set, Proxy proxy, const VisibilityOptions& 
   }
   look_at_proxy(progress);
 }
+
+Lumigraph::Lumigraph(Lumigraph&&) noexcept = default;
+
+Lumigraph::~Lumigraph() = default;
 
 void Lumigraph::set_proxy(Proxy proxy, const Progress& progress) {
   std::visit([this]<typename T>(T&& other) { proxy_.emplace<std::remove_cvref_t<T>>(std::forward<T>(other)); }, std::move(proxy));
@@ -133,14 +138,18 @@ std::vector<AnsweringView> Lumigraph::views_from(const Eigen::Vector3d& eye, con
   return views;
 }
 
-std::vector<std::uint32_t> Lumigraph::speaking(std::span<const std::uint32_t> views) const {
+CandidateViews Lumigraph::speaking(std::span<const std::uint32_t> views) const {
   std::vector<std::uint32_t> all(views.begin(), views.end());
   if (all.empty()) {
     all.resize(sources_.size());
     std::iota(all.begin(), all.end(), 0U);
   }
-  for (const std::uint32_t view : all) check(view < sources_.size(), "a photo that may speak is one of the set");
-  return all;
+  CandidateViews speaking{{}, std::numeric_limits<float>::infinity()};
+  for (const std::uint32_t view : all) {
+    check(view < sources_.size(), "a photo that may speak is one of the set");
+    speaking.views.push_back({0, view});
+  }
+  return speaking;
 }
 
 LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& options,
@@ -148,21 +157,22 @@ LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& opt
   check(!options.validate(), "the lumigraph's options are valid");
   const std::vector<AnsweringView> answering =
       views_from(view.cam_from_world.inverse().translation, options);
-  const std::vector<std::uint32_t> may_speak = speaking(views);
+  const CandidateViews may_speak = speaking(views);
   const TileFrame frame{view, proxy_, options, visibility_.tolerance, answering, may_speak};
   const int width = view.camera.width;
   const int height = view.camera.height;
   LumigraphPicture result{ImageU8(), ImageU8(width, height, 1)};
   if (options.shown == Shown::blending_field) {
     ImageU8 picture(width, height, 3);
-    render_tiles(frame, [&](const ChosenViews& chosen) { blend_colours(chosen, picture, result.covered); });
+    render_tiles(frame, [&](const ChosenViews& chosen) { blend_colours(chosen, picture, result.covered); }, *pool_);
     result.picture = std::move(picture);
     return result;
   }
   std::visit(
       [&]<typename T>(const std::vector<PhotoPyramid<T>>& photos) {
         Image<T> picture(width, height, 3);
-        render_tiles(frame, [&](const ChosenViews& chosen) { blend_photos(chosen, photos, picture, result.covered); });
+        render_tiles(frame, [&](const ChosenViews& chosen) { blend_photos(chosen, photos, picture, result.covered); },
+                     *pool_);
         result.picture = std::move(picture);
       },
       pyramids_);
@@ -179,16 +189,16 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
   one.camera.parameters[3] -= pixel.y() - 0.5;
   const std::vector<AnsweringView> answering =
       views_from(view.cam_from_world.inverse().translation, options);
-  const std::vector<std::uint32_t> may_speak = speaking(views);
+  const CandidateViews may_speak = speaking(views);
   std::vector<ViewWeight> weights;
-  const auto take = [&](const ChosenViews& chosen) {
+  const TakeChosen take = [&](const ChosenViews& chosen) {
     if (chosen.pixel[0] < 0) return;
     for (std::size_t row = 0; row < static_cast<std::size_t>(chosen.k); ++row)
       if (const float weight = chosen.weight[row * chosen.row_length]; weight > 0)
         weights.push_back({chosen.view[row * chosen.row_length], weight});
   };
   const TileFrame frame{one, proxy_, options, visibility_.tolerance, answering, may_speak};
-  TileRenderer(frame, take).render(0, 0);
+  TileRenderer(frame, pool_->local(), take).render(0, 0);
   return weights;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,6 +20,9 @@
 #include "host/lumigraph/source_sight.h"
 
 namespace mf {
+
+struct CandidateViews;
+class TilePool;
 
 // What a picture of the lumigraph shows: the place, or which photo speaks for what, each in a colour of its own (the
 // blending field of Buehler et al. 2001, figure 6).
@@ -56,6 +60,9 @@ class Lumigraph {
   // Copies what it needs of the photos. Precondition: check_photos(photos).
   Lumigraph(const PhotoSet& photos, Proxy proxy, const VisibilityOptions& = {}, const Progress& = {});
 
+  Lumigraph(Lumigraph&&) noexcept;
+  ~Lumigraph();
+
   // Another proxy for the same photos: at once for a plane or walls; a mesh is looked at from every photo.
   void set_proxy(Proxy proxy, const Progress& = {});
 
@@ -83,7 +90,7 @@ class Lumigraph {
  private:
   void look_at_proxy(const Progress&);
   [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, const LumigraphOptions&) const;
-  [[nodiscard]] std::vector<std::uint32_t> speaking(std::span<const std::uint32_t> views) const;
+  [[nodiscard]] CandidateViews speaking(std::span<const std::uint32_t> views) const;
 
   std::vector<Source> sources_;
   std::vector<AnsweringCamera> cameras_;
@@ -92,6 +99,7 @@ class Lumigraph {
   Proxy proxy_;
   VisibilityOptions visibility_;
   std::vector<SourceSight> sights_;
+  std::unique_ptr<TilePool> pool_;  // memory that frames take over from each other
 };
 
 // The colour of a photo in the blending field: neighbours in number are far apart in hue.

@@ -51,7 +51,8 @@ class SurfaceBuilder {
       const Eigen::Vector3f n = (mesh_.positions[b] - p).cross(mesh_.positions[c] - p);
       for (const std::uint32_t vertex : {a, b, c}) mesh_.normals[vertex] += n;
     }
-    for (Eigen::Vector3f& n : mesh_.normals) n = n.norm() > 0 ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f::UnitZ();
+    for (Eigen::Vector3f& n : mesh_.normals)
+      n = n.norm() > 0 ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f::UnitZ();
     mesh_.albedo.assign(mesh_.positions.size(), Eigen::Vector3f::Constant(default_albedo));
     return std::move(mesh_);
   }

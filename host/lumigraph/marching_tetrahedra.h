@@ -26,9 +26,9 @@ struct ScalarGrid {
   }
 };
 
-// The surface where the field is zero, its positive side inside. Each cube is cut into six tetrahedra about one diagonal
-// (Kuhn 1960): neighbours cut their common face alike, so that the surface has no crack and no ambiguous case, unlike
-// marching cubes (Doi, Koide 1991). Vertices are shared; normals are the triangles', weighted by area.
+// The surface where the field is zero, its positive side inside. Each cube is cut into six tetrahedra about one
+// diagonal (Kuhn 1960): neighbours cut their common face alike, so that the surface has no crack and no ambiguous case,
+// unlike marching cubes (Doi, Koide 1991). Vertices are shared; normals are the triangles', weighted by area.
 // Precondition: the field is negative on the grid's border, so that the surface is closed.
 [[nodiscard]] TriangleMesh zero_surface(const ScalarGrid&);
 

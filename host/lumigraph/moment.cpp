@@ -27,7 +27,8 @@ Moment moment_of(const PhotoSet& set, std::optional<double> period_s, double pen
   double last = -first;
   for (const PosedPhoto& photo : set.photos) {
     if (!photo.time_s || !std::isfinite(*photo.time_s))
-      throw InputError(set.source, photo.name, "has no time: give each frame its \"time\" in seconds (transforms.json)");
+      throw InputError(set.source, photo.name,
+                       "has no time: give each frame its \"time\" in seconds (transforms.json)");
     first = std::min(first, *photo.time_s);
     last = std::max(last, *photo.time_s);
   }

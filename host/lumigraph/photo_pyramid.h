@@ -15,16 +15,21 @@ namespace mf {
 // Four floats that the compiler keeps in one register: red, green, blue and nothing.
 using Float4 = float __attribute__((vector_size(16)));
 
-template <typename T>
-struct FourOf;
-template <>
-struct FourOf<float> {
-  using Type = Float4;
-};
-template <>
-struct FourOf<std::uint8_t> {
-  using Type = std::uint8_t __attribute__((vector_size(4)));
-};
+// Four values in memory as floats.
+inline Float4 load_four(const float* values) {
+  Float4 four;
+  std::memcpy(&four, values, sizeof four);
+  return four;
+}
+inline Float4 load_four(const std::uint8_t* values) {
+  using Words = std::uint32_t __attribute__((vector_size(16)));
+  using Integers = std::int32_t __attribute__((vector_size(16)));
+  std::uint32_t packed;
+  std::memcpy(&packed, values, sizeof packed);
+  // Shifts of one word; a conversion of four bytes would be done one by one.
+  const Words words = (Words{packed, packed, packed, packed} >> Words{0, 8, 16, 24}) & 255U;
+  return __builtin_convertvector(Integers(words), Float4);
+}
 
 // A photo at full, half, quarter ... size, four values a texel so that one load brings a colour.
 template <typename T>
@@ -53,13 +58,10 @@ class PhotoPyramid {
     int height = 0;
     std::vector<T> texels;  // four a pixel
 
-    [[nodiscard]] Float4 at(int x, int y) const {
-      typename FourOf<T>::Type texel;
-      std::memcpy(&texel, texels.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                                              static_cast<std::size_t>(x)),
-                  sizeof texel);
-      return __builtin_convertvector(texel, Float4);
+    [[nodiscard]] const T* texel(int x, int y) const {
+      return texels.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
     }
+    [[nodiscard]] Float4 at(int x, int y) const { return load_four(texel(x, y)); }
   };
 
   [[nodiscard]] static Float4 bilinear(const Level& level, float x, float y) {

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <variant>
 
@@ -35,11 +36,13 @@ struct BoxProxy {
 };
 
 struct MeshProxy {
-  explicit MeshProxy(TriangleMesh m, bool surrounds_views = false)
-      : mesh(std::move(m)), scene(mesh), surrounds(surrounds_views) {}
+  explicit MeshProxy(TriangleMesh m, std::optional<Eigen::Vector3f> inside_of_walls = {})
+      : mesh(std::move(m)), scene(mesh), inside(std::move(inside_of_walls)) {}
   TriangleMesh mesh;
   RayScene scene;
-  bool surrounds;  // the views: a ray meets the wall that it crosses last, as with the sphere and the box
+  // Surroundings: a point that the mesh stands about. A ray meets the first triangle that it crosses away from this
+  // point; a view beyond a wall looks through it, as with the sphere and the box.
+  std::optional<Eigen::Vector3f> inside;
 };
 
 using Proxy = std::variant<PlaneProxy, SphereProxy, BoxProxy, MeshProxy>;

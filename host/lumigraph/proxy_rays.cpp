@@ -3,7 +3,6 @@
 
 #include <embree3/rtcore.h>
 
-#include <array>
 #include <cmath>
 #include <limits>
 
@@ -77,41 +76,63 @@ Eigen::Vector3f shading_normal(const TriangleMesh& mesh, std::uint32_t triangle,
       .normalized();
 }
 
+// Towards the inside: such a crossing is looked through.
+bool enters(const Eigen::Vector3f& inside, const Eigen::Vector3f& origin, const RTCRayHit16& hit, std::size_t i) {
+  const Eigen::Vector3f d(hit.ray.dir_x[i], hit.ray.dir_y[i], hit.ray.dir_z[i]);
+  const Eigen::Vector3f n(hit.hit.Ng_x[i], hit.hit.Ng_y[i], hit.hit.Ng_z[i]);
+  return n.dot(d) * n.dot(origin + hit.ray.tfar[i] * d - inside) < 0;
+}
+
+// Traces once more the rays whose crossing is looked through, from just beyond it.
+void cross_entrances(const MeshProxy& proxy, const Eigen::Vector3f& origin, int* valid, RTCRayHit16& hit) {
+  constexpr int most_walls = 8;         // beyond that many a view lies outside of everything that it should show
+  constexpr float just_beyond = 1e-4F;  // of the distance: above its rounding
+  RTCIntersectContext context = coherent_context();
+  for (int wall = 0; wall < most_walls; ++wall) {
+    bool any = false;
+    for (std::size_t i = 0; i < packet; ++i) {
+      if (valid[i] == 0) continue;
+      const bool met = hit.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      valid[i] = met && enters(*proxy.inside, origin, hit, i) ? -1 : 0;
+      if (valid[i] == 0) continue;
+      any = true;
+      hit.ray.tnear[i] = hit.ray.tfar[i] * (1 + just_beyond);
+      hit.ray.tfar[i] = no_hit;
+      hit.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    }
+    if (!any) return;
+    rtcIntersect16(valid, proxy.scene.handle(), &context, &hit);
+  }
+}
+
 void trace_packet(const MeshProxy& proxy, const ProxyRays& rays, std::size_t first) {
   const std::size_t count = std::min(packet, rays.dx.size() - first);
   RTCIntersectContext context = coherent_context();
   alignas(64) RTCRayHit16 hit;
   alignas(64) int valid[packet];
-  // From inside, a ray is traced backwards from beyond the mesh: what it meets first is what it crosses last.
-  const Bounds& bounds = proxy.scene.bounds();
-  const float beyond = proxy.surrounds ? (rays.origin - bounds.centre).norm() + 1.01F * bounds.radius : 0.0F;
-  std::array<float, packet> back{};  // where each starts, in lengths of its direction
   for (std::size_t i = 0; i < packet; ++i) {
     valid[i] = i < count ? -1 : 0;
     const std::size_t at = first + std::min(i, count - 1);
-    const Eigen::Vector3f d(rays.dx[at], rays.dy[at], rays.dz[at]);
-    if (proxy.surrounds) back[i] = beyond / d.norm();
-    const Eigen::Vector3f from = rays.origin + back[i] * d;
-    const Eigen::Vector3f along = proxy.surrounds ? Eigen::Vector3f(-d) : d;
-    hit.ray.org_x[i] = from.x();
-    hit.ray.org_y[i] = from.y();
-    hit.ray.org_z[i] = from.z();
-    hit.ray.dir_x[i] = along.x();
-    hit.ray.dir_y[i] = along.y();
-    hit.ray.dir_z[i] = along.z();
+    hit.ray.org_x[i] = rays.origin.x();
+    hit.ray.org_y[i] = rays.origin.y();
+    hit.ray.org_z[i] = rays.origin.z();
+    hit.ray.dir_x[i] = rays.dx[at];
+    hit.ray.dir_y[i] = rays.dy[at];
+    hit.ray.dir_z[i] = rays.dz[at];
     hit.ray.tnear[i] = 0;
-    hit.ray.tfar[i] = proxy.surrounds ? back[i] : no_hit;
+    hit.ray.tfar[i] = no_hit;
     hit.ray.time[i] = 0;
     hit.ray.mask[i] = ~0U;
     hit.ray.flags[i] = 0;
     hit.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
   }
   rtcIntersect16(valid, proxy.scene.handle(), &context, &hit);
+  if (proxy.inside) cross_entrances(proxy, rays.origin, valid, hit);
   for (std::size_t i = 0; i < count; ++i) {
     const bool met = hit.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     const Eigen::Vector3f n = met ? shading_normal(proxy.mesh, hit.hit.primID[i], hit.hit.u[i], hit.hit.v[i])
                                   : Eigen::Vector3f::UnitZ();
-    rays.distance[first + i] = !met ? no_hit : proxy.surrounds ? back[i] - hit.ray.tfar[i] : hit.ray.tfar[i];
+    rays.distance[first + i] = met ? hit.ray.tfar[i] : no_hit;
     rays.nx[first + i] = n.x();
     rays.ny[first + i] = n.y();
     rays.nz[first + i] = n.z();

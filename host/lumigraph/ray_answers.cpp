@@ -6,7 +6,7 @@
 #include <limits>
 
 // The loops over rays are written for the compiler's vectorizer: no branch but selections, no call. (This file is
-// compiled with -fno-math-errno and -fno-trapping-math, without which square roots and selections stay scalar.)
+// compiled with -fno-math-errno, -fno-trapping-math and -fno-thread-jumps, without which they stay scalar.)
 #define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v3", "default")))
 
 namespace mf {
@@ -14,44 +14,57 @@ namespace mf {
 namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-// A patch seen edge-on covers no pixels; where normals are interpolated or noisy this says nothing about resolution.
-constexpr float least_cosine = 0.05F;
 constexpr float nearest = 1e-3F;  // of the depth in the new view: points nearer to a photo's camera plane are not in it
 
-float smooth(float t) {
-  const float c = std::min(std::max(t, 0.0F), 1.0F);
+// By value: the references of std::min and std::max keep a loop from being vectorized.
+inline float larger(float a, float b) {
+  return a > b ? a : b;
+}
+inline float smaller(float a, float b) {
+  return a < b ? a : b;
+}
+
+inline float smooth(float t) {
+  const float c = smaller(larger(t, 0.0F), 1.0F);
   return c * c * (3 - 2 * c);
 }
 
-// Everything but visibility. The penalty's place holds the penalty before it is divided by the weight.
+// Everything but visibility; the penalties before they are divided by the weights.
 template <bool distorted>
 inline __attribute__((always_inline)) void project_all(const AnsweringView& v, const RayBundle& rays,
                                                        const PenaltyOptions& o, const RayAnswers& out,
-                                                       float* __restrict inverse_depth, float* __restrict weight) {
+                                                       float* inverse_depth, float* plain) {
   const std::size_t count = rays.dx.size();
   const AnsweringCamera c = v.camera;
-  const float* __restrict dx = rays.dx.data();
-  const float* __restrict dy = rays.dy.data();
-  const float* __restrict dz = rays.dz.data();
-  const float* __restrict depth = rays.depth.data();
-  const float* __restrict nx = rays.nx.data();
-  const float* __restrict ny = rays.ny.data();
-  const float* __restrict nz = rays.nz.data();
-  float* __restrict out_x = out.x.data();
-  float* __restrict out_y = out.y.data();
-  float* __restrict out_lod = out.lod.data();
-  float* __restrict out_plain = out.penalty.data();
+  const float* dx = rays.dx.data();
+  const float* dy = rays.dy.data();
+  const float* dz = rays.dz.data();
+  const float* depth = rays.depth.data();
+  const float* nx = rays.nx.data();
+  const float* ny = rays.ny.data();
+  const float* nz = rays.nz.data();
+  float* out_x = out.x.data();
+  float* out_y = out.y.data();
+  float* out_lod = out.lod.data();
+  float* weight = out.weight.data();
   const auto r = v.cam_from_world;
   const auto d = c.distortion;
   const float focal2 = c.fx * c.fy;
   const float focal2_ratio = rays.focal2 / focal2;
+  const auto eye = v.eye_in_cam;
+  const auto from_centre = v.eye_from_centre;
+  const float of_time = v.time_penalty;
+  const float per_border_px = v.per_border_px;
+  const float alpha = o.angle;
+  const float beta = o.resolution;
+#pragma GCC ivdep  // the spans don't overlap
   for (std::size_t i = 0; i < count; ++i) {
     const float px = depth[i] * dx[i];
     const float py = depth[i] * dy[i];
     const float pz = depth[i] * dz[i];
-    const float xc = r[0] * px + r[1] * py + r[2] * pz + v.eye_in_cam[0];
-    const float yc = r[3] * px + r[4] * py + r[5] * pz + v.eye_in_cam[1];
-    const float zc = r[6] * px + r[7] * py + r[8] * pz + v.eye_in_cam[2];
+    const float xc = r[0] * px + r[1] * py + r[2] * pz + eye[0];
+    const float yc = r[3] * px + r[4] * py + r[5] * pz + eye[1];
+    const float zc = r[6] * px + r[7] * py + r[8] * pz + eye[2];
     const bool before = zc > nearest * depth[i];
     const float inverse = 1 / (before ? zc : 1.0F);
     float x = xc * inverse;
@@ -67,9 +80,9 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
     const float u = c.fx * x + c.cx;
     const float w = c.fy * y + c.cy;
 
-    const float wx = px + v.eye_from_centre[0];
-    const float wy = py + v.eye_from_centre[1];
-    const float wz = pz + v.eye_from_centre[2];
+    const float wx = px + from_centre[0];
+    const float wy = py + from_centre[1];
+    const float wz = pz + from_centre[2];
     const float per_view = 1 / std::sqrt(wx * wx + wy * wy + wz * wz);
     const float per_ray = 1 / std::sqrt(dx[i] * dx[i] + dy[i] * dy[i] + dz[i] * dz[i]);
     const float ax = wx * per_view - dx[i] * per_ray;
@@ -77,72 +90,106 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
     const float az = wz * per_view - dz[i] * per_ray;
     const float chord = std::sqrt(ax * ax + ay * ay + az * az);
 
-    const float cos_view = std::max(std::abs(nx[i] * wx + ny[i] * wy + nz[i] * wz) * per_view, least_cosine);
-    const float cos_ray = std::max(std::abs(nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]) * per_ray, least_cosine);
+    const float cos_view = larger(std::abs(nx[i] * wx + ny[i] * wy + nz[i] * wz) * per_view, edge_on_cosine);
+    const float cos_ray = larger(std::abs(nx[i] * dx[i] + ny[i] * dy[i] + nz[i] * dz[i]) * per_ray, edge_on_cosine);
     // Areas: f² cos |X−C| / z³, and for the new view with |X−E| = depth · |d|, z = depth.
     const float area_ratio = focal2_ratio * (cos_ray * per_view * zc * zc * zc) / (per_ray * cos_view * depth[i] * depth[i]);
     const float octaves = 0.5F * approximate_log2(before ? area_ratio : 1.0F);
 
-    const float to_side = std::min(u, c.width - u) * v.per_border_px;
-    const float to_top = std::min(w, c.height - w) * v.per_border_px;
-    const bool inside = before && r2 < c.largest_r2;
-    const float sx = std::min(std::max(to_side, 0.0F), 1.0F);
-    const float sy = std::min(std::max(to_top, 0.0F), 1.0F);
-    const float border = sx * sx * (3 - 2 * sx) * sy * sy * (3 - 2 * sy);
+    const float to_side = smaller(u, c.width - u) * per_border_px;
+    const float to_top = smaller(w, c.height - w) * per_border_px;
+    const bool inside = before & (r2 < c.largest_r2);
+    const float border = smooth(to_side) * smooth(to_top);
 
     out_x[i] = u;
     out_y[i] = w;
-    out_lod[i] = std::max(-octaves, 0.0F);
-    out_plain[i] = o.angle * chord + o.resolution * std::max(octaves, 0.0F) + v.time_penalty;
+    out_lod[i] = larger(-octaves, 0.0F);
+    plain[i] = alpha * chord + beta * larger(octaves, 0.0F) + of_time;
     inverse_depth[i] = inverse;
     weight[i] = inside ? border : 0.0F;
   }
 }
 
-// What the photo sees at (x, y) of a point at this inverse depth: between four texels.
-float sight_at(const SourceSight& sight, float x, float y, float inverse_depth, float tolerance) {
-  const float u = std::clamp(x * sight.texels_per_px - 0.5F, 0.0F, static_cast<float>(sight.width - 1));
-  const float v = std::clamp(y * sight.texels_per_px - 0.5F, 0.0F, static_cast<float>(sight.height - 1));
-  const int x0 = static_cast<int>(u);
-  const int y0 = static_cast<int>(v);
-  const int right = x0 + 1 < sight.width ? 1 : 0;
-  const int below = y0 + 1 < sight.height ? sight.width : 0;
-  const float a = u - static_cast<float>(x0);
-  const float b = v - static_cast<float>(y0);
-  const SourceSight::Texel* t = sight.texels.data() + static_cast<std::ptrdiff_t>(y0) * sight.width + x0;
-  const auto between = [&](auto value) {
-    const float top = value(t[0]) + a * (value(t[right]) - value(t[0]));
-    const float bottom = value(t[below]) + a * (value(t[below + right]) - value(t[below]));
-    return top + b * (bottom - top);
-  };
-  constexpr float per_code = 1.0F / 65535;
-  const float surface = between([](auto texel) { return static_cast<float>(texel.inverse_depth); }) * per_code;
-  const float trust = between([](auto texel) { return static_cast<float>(texel.trust); }) * per_code;
-  const float behind = surface * sight.scale / inverse_depth - 1;  // of the point's depth: 0 on the surface
-  return trust * std::max(least_sight, 1 - smooth(behind / tolerance - 1));
+// Multiplies the weights by what the photo sees of points at these inverse depths: between four texels.
+MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, const float* inverse_depth, float tolerance,
+                        std::size_t count) {
+  const float* x = answers.x.data();
+  const float* y = answers.y.data();
+  float* weight = answers.weight.data();
+  const std::uint32_t* texels = sight.texels.data();
+  const float per_px = sight.texels_per_px;
+  const auto last_x = static_cast<float>(sight.width - 1);
+  const auto last_y = static_cast<float>(sight.height - 1);
+  const int width = sight.width;
+  const float scale = sight.scale / 65535;
+  const float per_tolerance = 1 / tolerance;
+#pragma GCC ivdep  // the spans don't overlap
+  for (std::size_t i = 0; i < count; ++i) {
+    const float u = smaller(larger(x[i] * per_px - 0.5F, 0.0F), last_x);
+    const float v = smaller(larger(y[i] * per_px - 0.5F, 0.0F), last_y);
+    const int x0 = static_cast<int>(u);
+    const int y0 = static_cast<int>(v);
+    const int right = static_cast<float>(x0) < last_x ? 1 : 0;
+    const int below = static_cast<float>(y0) < last_y ? width : 0;
+    const float a = u - static_cast<float>(x0);
+    const float b = v - static_cast<float>(y0);
+    const int at = y0 * width + x0;
+    const std::uint32_t t00 = texels[at];
+    const std::uint32_t t01 = texels[at + right];
+    const std::uint32_t t10 = texels[at + below];
+    const std::uint32_t t11 = texels[at + below + right];
+    const auto upper = [](std::uint32_t texel) { return static_cast<float>(static_cast<std::int32_t>(texel >> 16U)); };
+    const auto lower = [](std::uint32_t texel) { return static_cast<float>(static_cast<std::int32_t>(texel & 0xFFFFU)); };
+    const float surface_top = upper(t00) + a * (upper(t01) - upper(t00));
+    const float surface_bottom = upper(t10) + a * (upper(t11) - upper(t10));
+    const float trust_top = lower(t00) + a * (lower(t01) - lower(t00));
+    const float trust_bottom = lower(t10) + a * (lower(t11) - lower(t10));
+    const float surface = scale * (surface_top + b * (surface_bottom - surface_top));
+    const float trust = (trust_top + b * (trust_bottom - trust_top)) / 65535;
+    const float behind = surface / inverse_depth[i] - 1;  // of the point's depth: 0 on the surface
+    weight[i] *= trust * larger(least_sight, 1 - smooth(behind * per_tolerance - 1));
+  }
 }
 
 MF_VECTORIZED void project_plain(const AnsweringView& v, const RayBundle& rays, const PenaltyOptions& o,
-                                 const RayAnswers& out, float* inverse_depth, float* weight) {
-  project_all<false>(v, rays, o, out, inverse_depth, weight);
+                                 const RayAnswers& out, float* inverse_depth, float* plain) {
+  project_all<false>(v, rays, o, out, inverse_depth, plain);
 }
 
 MF_VECTORIZED void project_distorted(const AnsweringView& v, const RayBundle& rays, const PenaltyOptions& o,
-                                     const RayAnswers& out, float* inverse_depth, float* weight) {
-  project_all<true>(v, rays, o, out, inverse_depth, weight);
+                                     const RayAnswers& out, float* inverse_depth, float* plain) {
+  project_all<true>(v, rays, o, out, inverse_depth, plain);
 }
 
-MF_VECTORIZED void divide(float* __restrict penalty, const float* __restrict weight, std::size_t count) {
+MF_VECTORIZED bool any_below(const float* a, const float* b, std::size_t count) {
+  int below = 0;
+  for (std::size_t i = 0; i < count; ++i) below |= a[i] < b[i] ? 1 : 0;
+  return below != 0;
+}
+
+// plain / weight^γ for γ = ½, whose root is a machine instruction, and for any other.
+MF_VECTORIZED void divide_by_root(const float* plain, const float* weight, float* penalty, std::size_t count) {
+#pragma GCC ivdep  // the spans don't overlap
   for (std::size_t i = 0; i < count; ++i)
-    penalty[i] = weight[i] > 0 ? penalty[i] / std::max(weight[i], 1e-20F) : infinite;
+    penalty[i] = weight[i] > 0 ? plain[i] / std::sqrt(larger(weight[i], 1e-20F)) : infinite;
 }
 
-MF_VECTORIZED void insert(float* __restrict penalty, std::int32_t* __restrict candidate, std::size_t rays, int rows,
-                          std::int32_t id, float* __restrict moving_penalty, std::int32_t* __restrict moving) {
+void divide(std::span<const float> plain, std::span<const float> weight, float gamma, std::span<float> penalty) {
+  if (gamma == 0.5F) {
+    divide_by_root(plain.data(), weight.data(), penalty.data(), plain.size());
+    return;
+  }
+  for (std::size_t i = 0; i < plain.size(); ++i)
+    penalty[i] = weight[i] > 0 ? plain[i] / std::pow(weight[i], gamma) : infinite;
+}
+
+MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t rays, int rows,
+                          std::int32_t id, float* moving_penalty, std::int32_t* moving) {
   for (std::size_t i = 0; i < rays; ++i) moving[i] = id;
   for (int row = 0; row < rows; ++row) {
-    float* __restrict row_penalty = penalty + static_cast<std::size_t>(row) * rays;
-    std::int32_t* __restrict row_candidate = candidate + static_cast<std::size_t>(row) * rays;
+    float* row_penalty = penalty + static_cast<std::size_t>(row) * rays;
+    std::int32_t* row_candidate = candidate + static_cast<std::size_t>(row) * rays;
+#pragma GCC ivdep  // rows don't overlap
     for (std::size_t i = 0; i < rays; ++i) {
       const float held = row_penalty[i];
       const float offered = moving_penalty[i];
@@ -155,12 +202,6 @@ MF_VECTORIZED void insert(float* __restrict penalty, std::int32_t* __restrict ca
       moving[i] = better ? held_id : offered_id;
     }
   }
-}
-
-MF_VECTORIZED bool any_below(const float* a, const float* b, std::size_t count) {
-  int below = 0;
-  for (std::size_t i = 0; i < count; ++i) below |= a[i] < b[i] ? 1 : 0;
-  return below != 0;
 }
 
 }  // namespace
@@ -217,29 +258,26 @@ AnsweringView answering_view(const AnsweringCamera& camera, const Rigid3& cam_fr
 }
 
 void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptions& options, float depth_tolerance,
-            const RayAnswers& out) {
+            std::span<const float> worst, const RayAnswers& out) {
   const std::size_t count = rays.dx.size();
   alignas(64) std::array<float, largest_bundle> inverse_depth;
-  const std::span<float> weight = out.weight;
+  alignas(64) std::array<float, largest_bundle> plain;
   if (view.camera.distorted)
-    project_distorted(view, rays, options, out, inverse_depth.data(), weight.data());
+    project_distorted(view, rays, options, out, inverse_depth.data(), plain.data());
   else
-    project_plain(view, rays, options, out, inverse_depth.data(), weight.data());
-  if (view.sight != nullptr)
-    for (std::size_t i = 0; i < count; ++i)
-      if (weight[i] > 0) weight[i] *= sight_at(*view.sight, out.x[i], out.y[i], inverse_depth[i], depth_tolerance);
-  if (options.border == 1) {
-    divide(out.penalty.data(), weight.data(), count);
-    return;
-  }
-  for (std::size_t i = 0; i < count; ++i)
-    out.penalty[i] = weight[i] > 0 ? out.penalty[i] / std::pow(weight[i], options.border) : infinite;
+    project_plain(view, rays, options, out, inverse_depth.data(), plain.data());
+  const auto of_bundle = std::span<const float>(plain).first(count);
+  divide(of_bundle, out.weight, options.border, out.penalty);
+  if (view.sight == nullptr || !any_below(out.penalty.data(), worst.data(), count)) return;
+  look(*view.sight, out, inverse_depth.data(), depth_tolerance, count);
+  divide(of_bundle, out.weight, options.border, out.penalty);
 }
 
-float least_penalty(const AnsweringView& view, const Eigen::Vector3f& centre, float radius,
-                    const PenaltyOptions& options) {
+float least_penalty(const AnsweringView& view, const RaysRegion& region, const PenaltyOptions& options) {
   const auto& r = view.cam_from_world;
   const AnsweringCamera& c = view.camera;
+  const Eigen::Vector3f& centre = region.centre;
+  const float radius = region.radius;
   const float x = r[0] * centre.x() + r[1] * centre.y() + r[2] * centre.z() + view.eye_in_cam[0];
   const float y = r[3] * centre.x() + r[4] * centre.y() + r[5] * centre.z() + view.eye_in_cam[1];
   const float z = r[6] * centre.x() + r[7] * centre.y() + r[8] * centre.z() + view.eye_in_cam[2];
@@ -261,7 +299,22 @@ float least_penalty(const AnsweringView& view, const Eigen::Vector3f& centre, fl
   const float largest_chord = std::min(2.0F, chord + 2 * radius / std::min(nearest_view, nearest_eye));
   const float rate = (std::abs(to_view - to_eye) + radius * largest_chord) / (nearest_view * nearest_eye) +
                      largest_chord / std::max(nearest_view, nearest_eye);
-  return options.angle * std::max(0.0F, chord - radius * rate) + view.time_penalty;
+  const float angle_and_time = options.angle * std::max(0.0F, chord - radius * rate) + view.time_penalty;
+  // The photo's cosine is at most the ray's and the chord. Its area falls with depth: the nearest counts.
+  const float nearest_z = z - radius;
+  if (!(nearest_z > 0)) return angle_and_time;
+  const float cosines = 1 + (chord + radius * rate) / region.least_cosine;
+  const float area_ratio =
+      region.least_area * nearest_z * nearest_z * nearest_z / (c.fx * c.fy * (to_view + radius) * cosines);
+  constexpr float slip = 1e-4F;  // octaves: above the approximation of the logarithm
+  return angle_and_time + options.resolution * std::max(0.0F, 0.5F * approximate_log2(std::max(area_ratio, 1e-30F)) - slip);
+}
+
+MF_VECTORIZED bool any_reaches(std::span<const float> penalty, float bound) {
+  const float* values = penalty.data();
+  int reached = 0;
+  for (std::size_t i = 0; i < penalty.size(); ++i) reached |= values[i] >= bound ? 1 : 0;
+  return reached != 0;
 }
 
 void clear(const LeastPenalties& least) {
@@ -270,8 +323,7 @@ void clear(const LeastPenalties& least) {
 }
 
 void add_candidate(const LeastPenalties& least, std::int32_t candidate, std::span<const float> penalty) {
-  const float* last = least.penalty.data() + static_cast<std::size_t>(least.k) * least.rays;
-  if (!any_below(penalty.data(), last, least.rays)) return;
+  if (!any_below(penalty.data(), worst_of(least).data(), least.rays)) return;
   alignas(64) std::array<float, largest_bundle> moving_penalty;
   alignas(64) std::array<std::int32_t, largest_bundle> moving;
   std::copy(penalty.begin(), penalty.end(), moving_penalty.begin());

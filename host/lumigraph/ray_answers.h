@@ -13,6 +13,10 @@ namespace mf {
 
 inline constexpr std::size_t largest_bundle = 64;  // rays
 
+// Cosines between normal and ray count as at least this: a patch seen edge-on covers no pixels, and where normals are
+// interpolated or noisy that says nothing about resolution.
+inline constexpr float edge_on_cosine = 0.05F;
+
 // Rays of the new view and the proxy points that they meet, by coordinate. A ray's direction has length 1 along the new
 // view's optical axis, so that `depth` is both its length's factor and the point's depth:  X = E + depth · d.
 struct RayBundle {  // at most largest_bundle rays
@@ -61,13 +65,22 @@ struct RayAnswers {
 //   angle       the chord |u − v| of the unit vectors from X to E and to C: 2 sin(θ/2), exact where it counts, at 0
 //   resolution  octaves, from the areas that a patch of the proxy covers in both pictures: f² |n·(X−C)| / z³
 //   weight      the soft border, times what the photo sees of X (SourceSight)
+// Only penalties below `worst` of their ray are finished; others are at least that, without what the photo sees of X.
 // Precondition: at most largest_bundle rays.
-void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance, const RayAnswers&);
+void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance,
+            std::span<const float> worst, const RayAnswers&);
 
-// No point within `radius` of `centre` (relative to E) gives the photo a smaller penalty; infinite when none of them
-// lies in its picture. Neither resolution nor visibility is looked at: they only raise penalties.
-[[nodiscard]] float least_penalty(const AnsweringView&, const Eigen::Vector3f& centre, float radius,
-                                  const PenaltyOptions&);
+// Proxy points that rays of the new view meet, as a whole: in a sphere.
+struct RaysRegion {
+  Eigen::Vector3f centre = Eigen::Vector3f::Zero();  // relative to E
+  float radius = 0;
+  float least_cosine = 1;  // of the angle between ray and normal, either side
+  float least_area = 0;    // px² of the new view that a patch of 1 m² across the ray covers: f² |X−E| / z³
+};
+
+// No point of the region gives the photo a smaller penalty; infinite when none of them lies in its picture. Visibility
+// is not looked at: it only raises penalties.
+[[nodiscard]] float least_penalty(const AnsweringView&, const RaysRegion&, const PenaltyOptions&);
 
 // The k + 1 least penalties of each ray, in rising order, and which candidate has them. One ray a column.
 struct LeastPenalties {
@@ -77,6 +90,10 @@ struct LeastPenalties {
   int k = 1;
 };
 void clear(const LeastPenalties&);
+[[nodiscard]] inline std::span<const float> worst_of(const LeastPenalties& least) {
+  return least.penalty.subspan(static_cast<std::size_t>(least.k) * least.rays, least.rays);
+}
+[[nodiscard]] bool any_reaches(std::span<const float> penalty, float bound);
 void add_candidate(const LeastPenalties&, std::int32_t candidate, std::span<const float> penalty);
 
 }  // namespace mf

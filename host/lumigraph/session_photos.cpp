@@ -32,8 +32,8 @@ PixelBox box_about(const Polygon2& polygon, int width, int height) {
     high = high.cwiseMax(corner);
   }
   const auto within = [](double value, int size) { return static_cast<int>(std::clamp<double>(value, 0, size)); };
-  return {within(std::floor(low.x()), width), within(std::floor(low.y()), height),
-          within(std::ceil(high.x()), width), within(std::ceil(high.y()), height)};
+  return {within(std::floor(low.x()), width), within(std::floor(low.y()), height), within(std::ceil(high.x()), width),
+          within(std::ceil(high.y()), height)};
 }
 
 template <typename T>
@@ -88,7 +88,8 @@ class SessionPhotos {
       : session_(session), response_(response), calibration_(calibration), options_(options) {}
 
   [[nodiscard]] PosedPhoto scene(const SessionFrame& frame) const {
-    return finished({"scene/" + frame.info.name, calibration_.camera, cam_from_world(), read(frame), {}, frame.info.time_s});
+    return finished(
+        {"scene/" + frame.info.name, calibration_.camera, cam_from_world(), read(frame), {}, frame.info.time_s});
   }
 
   // Nothing when the frame shows too little of the mirror.

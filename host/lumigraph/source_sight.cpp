@@ -70,12 +70,11 @@ ImageF distance_to_jumps(const ImageF& inverse, float reach) {
 }
 
 bool hides_itself(const Proxy& proxy) {
-  const auto* mesh = std::get_if<MeshProxy>(&proxy);
-  return mesh != nullptr && !mesh->surrounds;
+  return std::holds_alternative<MeshProxy>(proxy);
 }
 
-std::uint16_t code(float value) {
-  return static_cast<std::uint16_t>(std::lround(code_range * std::clamp(value, 0.0F, 1.0F)));
+std::uint32_t code(float value) {
+  return static_cast<std::uint32_t>(std::lround(code_range * std::clamp(value, 0.0F, 1.0F)));
 }
 
 void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_from_world, const Proxy& proxy, const VisibilityOptions& options) {
@@ -87,8 +86,8 @@ void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_
   const ImageF distance = distance_to_jumps(inverse, reach);
   for (std::size_t i = 0; i < sight.texels.size(); ++i) {
     const float ramp = distance.data[i] / reach;
-    sight.texels[i] = {code(inverse.data[i] / sight.scale),
-                       code(std::max(least_trust, ramp * ramp * (3 - 2 * ramp)))};
+    sight.texels[i] = SourceSight::texel(code(inverse.data[i] / sight.scale),
+                                         code(std::max(least_sight, ramp * ramp * (3 - 2 * ramp))));
   }
 }
 
@@ -108,12 +107,12 @@ SourceSight make_sight(const CameraModel& camera, const Rigid3& cam_from_world, 
   sight.height = std::max(1, camera.height / step_px);
   sight.texels_per_px = static_cast<float>(sight.width) / static_cast<float>(camera.width);
   sight.texels.assign(static_cast<std::size_t>(sight.width) * static_cast<std::size_t>(sight.height),
-                      {0, static_cast<std::uint16_t>(code_range)});
+                      SourceSight::texel(0, static_cast<std::uint32_t>(code_range)));
   if (hides_itself(proxy)) set_depth(sight, camera, cam_from_world, proxy, options);
   if (mask.empty()) return sight;
   const ImageU8 small = area_average(mask, sight.width, sight.height);
   for (std::size_t i = 0; i < sight.texels.size(); ++i)
-    sight.texels[i].trust = static_cast<std::uint16_t>(sight.texels[i].trust * small.data[i] / 255);
+    sight.texels[i] = SourceSight::texel(sight.texels[i] >> 16U, (sight.texels[i] & 0xFFFFU) * small.data[i] / 255);
   return sight;
 }
 

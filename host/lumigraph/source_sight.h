@@ -23,10 +23,12 @@ struct VisibilityOptions {
 // What one photo sees of the proxy, on a grid of `step` photo pixels. Inverse depth, because that is linear in the
 // picture over any plane: between texels a plane is met exactly.
 struct SourceSight {
-  struct Texel {
-    std::uint16_t inverse_depth = 0;  // of the proxy along the optical axis, times 65535 · scale; 0: nothing there
-    std::uint16_t trust = 0;          // mask times distance from silhouettes, 0…65535
-  };
+  // Upper half: inverse depth of the proxy along the optical axis, 65535 at `scale`; 0: nothing there. Lower half:
+  // mask times distance from silhouettes, 65535 is full trust. One word, so that one load brings both.
+  using Texel = std::uint32_t;
+  [[nodiscard]] static Texel texel(std::uint32_t inverse_depth, std::uint32_t trust) {
+    return inverse_depth << 16U | trust;
+  }
   int width = 0;
   int height = 0;
   float texels_per_px = 1;
@@ -41,11 +43,8 @@ struct SourceSight {
 [[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask, const Proxy&,
                                      const VisibilityOptions&);
 
-// Hidden points keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
+// Hidden points, and those at silhouettes, keep this much weight: they speak where no photo has anything better, rather than leave a hole, and are
 // out-voted hundreds to one elsewhere. Only a mask silences a photo.
 inline constexpr float least_sight = 2e-5F;
-// Points at silhouettes keep this much: near a silhouette of the new view every near photo has one too, and without a
-// limit photos from far around would be called instead.
-inline constexpr float least_trust = 0.05F;
 
 }  // namespace mf

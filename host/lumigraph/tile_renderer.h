@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
@@ -11,16 +13,6 @@
 #include "host/lumigraph/ray_answers.h"
 
 namespace mf {
-
-// One frame of a lumigraph: what all its tiles share.
-struct TileFrame {
-  const View& view;
-  const Proxy& proxy;
-  const LumigraphOptions& options;
-  float depth_tolerance = 0;                // see VisibilityOptions
-  std::span<const AnsweringView> views;     // every photo, for this frame's eye
-  std::span<const std::uint32_t> speaking;  // those that may speak
-};
 
 // The photos that speak for some rays: k of them each, by rows, a ray a column.
 struct ChosenViews {
@@ -36,64 +28,93 @@ using TakeChosen = std::function<void(const ChosenViews&)>;
 
 inline constexpr int tile_side = 64;  // pixels
 
-// Chooses the photos for the pixels of one tile after another. It holds the working memory: one a thread.
+// Rays of the new view, one value each, and what they meet: see RayBundle.
+struct TileRays {
+  std::vector<float> dx, dy, dz, depth, nx, ny, nz;
+  std::vector<std::int32_t> pixel;
+
+  [[nodiscard]] std::size_t size() const { return pixel.size(); }
+  void resize(std::size_t);
+  void copy(std::size_t from, const TileRays& source, std::size_t to);
+  [[nodiscard]] RayBundle bundle(std::size_t first, std::size_t count, float focal2) const;
+};
+
+struct CandidateView {
+  float least = 0;  // no ray of the region gives the photo a smaller penalty
+  std::uint32_t view = 0;
+};
+struct CandidateViews {
+  std::vector<CandidateView> views;  // rising by `least`, so that ranking can stop
+  float bound = 0;                   // no photo that is missing has a smaller penalty at any ray of the region
+};
+
+// One frame of a lumigraph: what all its tiles share.
+struct TileFrame {
+  const View& view;
+  const Proxy& proxy;
+  const LumigraphOptions& options;
+  float depth_tolerance = 0;                // see VisibilityOptions
+  std::span<const AnsweringView> views;     // every photo, for this frame's eye
+  const CandidateViews& speaking;           // those that may speak, bounds 0 and infinite
+};
+
+// The memory that a thread renders tiles with. It is worth keeping from frame to frame.
+struct TileBuffers {
+  TileRays rays;         // of the tile, block by block
+  TileRays some;         // samples of a region, or rays that are ranked again
+  std::vector<float> x, y, lod, weight, penalty;  // answers, a row a candidate
+  std::vector<float> least_penalty;               // see LeastPenalties
+  std::vector<std::int32_t> least_candidate;
+  CandidateViews of_tile, of_block, again;
+  std::vector<std::int32_t> pixel;  // see ChosenViews, as the rest
+  std::vector<float> chosen_weight, chosen_sight, chosen_x, chosen_y, chosen_lod;
+  std::vector<std::uint32_t> chosen_view;
+};
+
+class TilePool {
+ public:
+  // This thread's. No tile waits for others, so that a thread renders one at a time.
+  [[nodiscard]] TileBuffers& local() { return buffers_.local(); }
+
+ private:
+  tbb::enumerable_thread_specific<TileBuffers> buffers_;
+};
+
+// Chooses the photos for the pixels of a tile.
 //
-// Photos are ranked for the tile, then for each block of it. What is dropped for a region is a photo whose penalty is
-// nowhere there below `bound`. A ray whose k + 1 best are not all below the bound is ranked again, among all photos that
-// could be better than its (k + 1)-th: so every ray gets what ranking all photos would have given it.
+// For the tile, and then for each block of it, photos are put in the order of the least penalty that any of its rays can
+// give them; rays are ranked in that order until no photo that is left can be among any ray's k + 1 best. Blocks look
+// only at photos up to the tile's bound, which some rays of it guess; a ray whose (k + 1)-th best is above the bound is
+// ranked again, up to that. So every ray gets what ranking all photos would have given it.
 class TileRenderer {
  public:
-  TileRenderer(const TileFrame&, TakeChosen);
+  TileRenderer(const TileFrame&, TileBuffers&, const TakeChosen&);
 
   // The tile whose first pixel is (x0, y0). Pixels where the proxy is not are not handed on.
   void render(int x0, int y0);
 
  private:
-  struct Rays {  // one value a ray
-    std::vector<float> dx, dy, dz, depth, nx, ny, nz;
-    std::vector<std::int32_t> pixel;
-
-    [[nodiscard]] std::size_t size() const { return pixel.size(); }
-    void resize(std::size_t);
-    void copy(std::size_t from, const Rays& source, std::size_t to);
-    [[nodiscard]] RayBundle bundle(std::size_t first, std::size_t count, float focal2) const;
-  };
-  struct Candidates {
-    std::vector<std::uint32_t> views;
-    float bound = 0;  // no other photo has a smaller penalty at any ray of the region
-  };
-  struct Region {  // rays [first, end) of a tile's
+  struct Region {  // rays [first, end)
     std::size_t first = 0;
     std::size_t end = 0;
   };
 
   void shoot(int x0, int y0);
   void shoot_block(int x0, int y0, int x1, int y1);
-  // Fills least_ with what each of the candidates can have at best on the rays; drops those out of sight.
-  void bound_from_below(const Rays&, const Region&, const Candidates& from, Candidates& to);
-  void narrow(const Candidates& from, const Region&, Candidates& to);
-  void choose(const Rays&, const Region&, const Candidates&);
-  void choose_again(const Rays&, float bound);
-  void start_ranking(std::size_t rays);
-  void rank(const RayBundle&, std::span<const std::uint32_t> views, std::size_t first_candidate);
-  void hand_on(std::size_t rays, const Candidates&);
+  // The candidates that the rays can give a penalty up to `below`, in order. `from` must be of a region around them.
+  void bound_from_below(const TileRays&, const Region&, const CandidateViews& from, float below, CandidateViews& to);
+  void rank_for_tile();
+  void choose(const TileRays&, const Region&, const CandidateViews&);
+  void choose_again(float bound);
+  void rank(const RayBundle&, const CandidateViews&);
+  void hand_on(std::size_t rays, const CandidateViews&);
 
   const TileFrame& frame_;
-  TakeChosen take_;
+  TileBuffers& buffers_;
+  const TakeChosen& take_;
   float focal2_;
   bool plain_camera_;
-
-  Rays rays_;                    // of the tile, block by block
-  std::vector<Region> blocks_;   // of the rays
-  Candidates all_;
-  Candidates of_tile_, of_block_, again_;
-  std::vector<std::pair<float, std::uint32_t>> least_;  // a photo's least penalty in a region, and the photo
-  std::vector<float> answers_x_, answers_y_, answers_lod_, answers_weight_, answers_penalty_;  // a row a candidate
-  std::vector<float> least_penalty_;
-  std::vector<std::int32_t> least_candidate_;
-  std::vector<std::int32_t> pixel_;
-  std::vector<float> weight_, sight_, x_, y_, lod_;
-  std::vector<std::uint32_t> view_;
+  std::vector<Region> blocks_;  // of the tile's rays
 };
 
 }  // namespace mf

@@ -34,7 +34,8 @@ double median(std::vector<double> values) {
 Rigid3 facing_frame(const PhotoSet& set) {
   const MeanSight sight = mean_sight(set);
   Eigen::Vector3d down = Eigen::Vector3d::Zero();
-  for (const PosedPhoto& photo : set.photos) down += photo.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
+  for (const PosedPhoto& photo : set.photos)
+    down += photo.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
   Eigen::Vector3d across = down.cross(sight.direction);
   // Photos turned all ways about their axes have no common down; any upright frame serves then.
   if (!(across.norm() > 1e-3 * static_cast<double>(set.photos.size()))) across = sight.direction.unitOrthogonal();
@@ -72,7 +73,9 @@ Window fitted_window(const PhotoSet& set, const Rigid3& uv_from_world, double st
   }
   Window window{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
   for (const std::size_t i : {0U, 1U}) {
-    const auto spread = [](const std::vector<double>& v) { return v.empty() ? 0.0 : quantile(v, 0.75) - quantile(v, 0.25); };
+    const auto spread = [](const std::vector<double>& v) {
+      return v.empty() ? 0.0 : quantile(v, 0.75) - quantile(v, 0.25);
+    };
     const auto axis = static_cast<Eigen::Index>(i);
     window.size_m[axis] = st_distance_m * field_of_view[i] + std::min(spread(at[i]), spread(from_camera[i]));
     if (!at[i].empty()) window.centre_m[axis] = median(at[i]);
@@ -87,7 +90,8 @@ double distance_to_proxy(const Lumigraph& lumigraph, const Rigid3& world_from_uv
   axis.cam_from_world = world_from_uv.inverse();
   const auto point = lumigraph.point_at(axis, {0.5, 0.5});
   if (!point)
-    throw InputError("--two-plane", "st_distance_m", "is not known: the mean line of sight does not meet the proxy. Give --st-distance");
+    throw InputError("--two-plane", "st_distance_m",
+                     "is not known: the mean line of sight does not meet the proxy. Give --st-distance");
   return (axis.cam_from_world * *point).z();
 }
 
@@ -124,7 +128,7 @@ json frame_entry(const View& view, const std::string& picture) {
 
 json transforms_of(const TwoPlane& planes) {
   const View first = grid_view(planes, 0, 0);
-  return {{"camera_model", "PINHOLE"}, {"w", planes.size_px[0]},   {"h", planes.size_px[1]},
+  return {{"camera_model", "PINHOLE"}, {"w", planes.size_px[0]},    {"h", planes.size_px[1]},
           {"fl_x", first.camera.fx()}, {"fl_y", first.camera.fy()}, {"frames", json::array()}};
 }
 
@@ -162,7 +166,11 @@ View grid_view(const TwoPlane& planes, int column, int row) {
                             per_metre_y * planes.st_distance_m,
                             per_metre_x * (u - corner.x()),
                             per_metre_y * (v - corner.y()),
-                            0, 0, 0, 0, 0};
+                            0,
+                            0,
+                            0,
+                            0,
+                            0};
   view.cam_from_world =
       (planes.world_from_uv * Rigid3{Eigen::Quaterniond::Identity(), Eigen::Vector3d(u, v, 0)}).inverse();
   return view;
@@ -170,7 +178,8 @@ View grid_view(const TwoPlane& planes, int column, int row) {
 
 TwoPlane fitted_two_plane(const Lumigraph& lumigraph, const PhotoSet& set, std::array<int, 2> cameras,
                           std::optional<double> st_distance_m) {
-  constexpr double outside = 0.1;  // of the centres on each side: a grid that reaches to the last photo would be guessed
+  constexpr double outside =
+      0.1;  // of the centres on each side: a grid that reaches to the last photo would be guessed
   TwoPlane planes;
   planes.cameras = cameras;
   planes.world_from_uv = facing_frame(set);
@@ -200,8 +209,10 @@ TwoPlane fitted_two_plane(const Lumigraph& lumigraph, const PhotoSet& set, std::
   planes.st_size_m = window.size_m;
   const double per_metre = median(focal_px) / planes.st_distance_m;
   for (const std::size_t i : {0U, 1U})
-    planes.size_px[i] = std::clamp(static_cast<int>(std::lround(per_metre * window.size_m[static_cast<Eigen::Index>(i)])), 2, 8192);
-  if (const auto wrong = planes.validate()) throw InputError("--two-plane", "", *wrong + " (fitted to the photos): give a layout");
+    planes.size_px[i] =
+        std::clamp(static_cast<int>(std::lround(per_metre * window.size_m[static_cast<Eigen::Index>(i)])), 2, 8192);
+  if (const auto wrong = planes.validate())
+    throw InputError("--two-plane", "", *wrong + " (fitted to the photos): give a layout");
   return planes;
 }
 
@@ -219,7 +230,8 @@ TwoPlane two_plane_from_json(const json& layout, const std::string& file) {
   if (!layout.is_object()) throw InputError(file, "", "is no two-plane layout: see docs/lumigraph.md");
   const json known = to_json(TwoPlane{});
   for (const auto& [key, value] : layout.items())
-    if (!known.contains(key)) throw InputError(file, key, "is not known: see docs/lumigraph.md for the layout's fields");
+    if (!known.contains(key))
+      throw InputError(file, key, "is not known: see docs/lumigraph.md for the layout's fields");
   if (!layout.contains("world_from_uv")) throw InputError(file, "world_from_uv", "is missing: add the 4×4 pose");
   TwoPlane planes;
   planes.world_from_uv = rigid3_from_json(layout.at("world_from_uv"), "world_from_uv", file);
@@ -262,7 +274,9 @@ TwoPlaneSummary write_two_plane(const fs::path& folder, const Lumigraph& lumigra
     ++summary.pictures;
   }
   if (covered == 0)
-    throw InputError(folder.string(), "", "would show nothing: no photo sees what lies beyond the st window. Give another layout or --proxy");
+    throw InputError(
+        folder.string(), "",
+        "would show nothing: no photo sees what lies beyond the st window. Give another layout or --proxy");
   summary.covered = static_cast<double>(covered) / (static_cast<double>(count) * planes.size_px[0] * planes.size_px[1]);
   write_json_file(folder / "two_plane.json", to_json(planes));
   write_json_file(folder / "transforms.json", transforms);

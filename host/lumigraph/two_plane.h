@@ -25,12 +25,12 @@ namespace mf {
 //   f = s · st_distance_m,   c_x = s_x · (u − x₀),   c_y = s_y · (v − y₀)
 struct TwoPlane {
   Rigid3 world_from_uv;
-  std::array<int, 2> cameras{8, 8};                             // columns along x, rows along y; ≥ 1
-  Eigen::Vector2d uv_size_m = Eigen::Vector2d::Ones();          // from the first to the last camera, about the origin
-  double st_distance_m = 1;                                     // > 0
-  Eigen::Vector2d st_centre_m = Eigen::Vector2d::Zero();        // of the window, x and y
-  Eigen::Vector2d st_size_m = Eigen::Vector2d::Ones();          // > 0
-  std::array<int, 2> size_px{512, 512};                         // of each picture; 2 to 8192
+  std::array<int, 2> cameras{8, 8};                       // columns along x, rows along y; ≥ 1
+  Eigen::Vector2d uv_size_m = Eigen::Vector2d::Ones();    // from the first to the last camera, about the origin
+  double st_distance_m = 1;                               // > 0
+  Eigen::Vector2d st_centre_m = Eigen::Vector2d::Zero();  // of the window, x and y
+  Eigen::Vector2d st_size_m = Eigen::Vector2d::Ones();    // > 0
+  std::array<int, 2> size_px{512, 512};                   // of each picture; 2 to 8192
 
   // What is wrong, in words that name the field; nothing when all is well.
   [[nodiscard]] std::optional<std::string> validate() const;
@@ -42,7 +42,8 @@ struct TwoPlane {
 // Planes that fit a lumigraph: uv through the mean of the photos' centres, square to their mean direction of sight and
 // upright as they are; as large as the middle four fifths of the centres reach; st where the mean line of sight meets
 // the proxy (or at `st_distance_m`), its window as large as the median photo's field of view there and as finely
-// sampled as it; larger where photos look apart from each other. Throws InputError when the photos look all around or the proxy is not met: give a layout then.
+// sampled as it; larger where photos look apart from each other. Throws InputError when the photos look all around or
+// the proxy is not met: give a layout then.
 [[nodiscard]] TwoPlane fitted_two_plane(const Lumigraph&, const PhotoSet&, std::array<int, 2> cameras,
                                         std::optional<double> st_distance_m);
 

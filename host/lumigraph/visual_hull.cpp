@@ -29,7 +29,8 @@ void relax_line(std::span<float> line, std::vector<int>& at, std::vector<float>&
   at[0] = 0;
   from[0] = -std::numeric_limits<float>::infinity();
   const auto crossing = [&](int p, int q) {
-    return ((value(q) + static_cast<float>(q * q)) - (value(p) + static_cast<float>(p * p))) / static_cast<float>(2 * (q - p));
+    return ((value(q) + static_cast<float>(q * q)) - (value(p) + static_cast<float>(p * p))) /
+           static_cast<float>(2 * (q - p));
   };
   for (int q = 1; q < n; ++q) {
     float s = crossing(at[static_cast<std::size_t>(k)], q);
@@ -112,7 +113,8 @@ ScalarGrid grid_over(const Box& box, int resolution) {
   ScalarGrid grid;
   const Eigen::Vector3d size = box.high - box.low;
   grid.spacing = size.maxCoeff() / resolution;
-  // A border of two cells lies about the box: the field is negative there by decree, and the box's own faces stay whole.
+  // A border of two cells lies about the box: the field is negative there by decree, and the box's own faces stay
+  // whole.
   grid.origin = box.low - 2 * Eigen::Vector3d::Constant(grid.spacing);
   for (Eigen::Index i = 0; i < 3; ++i)
     grid.corners[static_cast<std::size_t>(i)] = static_cast<int>(std::ceil(size[i] / grid.spacing - 1e-9)) + 5;
@@ -184,7 +186,8 @@ Eigen::Vector3d common_point(const std::vector<Silhouette>& silhouettes, const s
   }
   const auto solution = solve_symmetric(a, b);
   if (!solution)
-    throw InputError(source, "--proxy hull", "has silhouettes seen from one direction only: give hull:N,x0,y0,z0,x1,y1,z1");
+    throw InputError(source, "--proxy hull",
+                     "has silhouettes seen from one direction only: give hull:N,x0,y0,z0,x1,y1,z1");
   return *solution;
 }
 
@@ -193,7 +196,8 @@ Box found_box(const std::vector<Silhouette>& silhouettes, const std::string& sou
   constexpr int coarse = 48;
   const Eigen::Vector3d middle = common_point(silhouettes, source);
   double reach = std::numeric_limits<double>::infinity();
-  for (const Silhouette& silhouette : silhouettes) reach = std::min(reach, (centre_of(*silhouette.photo) - middle).norm());
+  for (const Silhouette& silhouette : silhouettes)
+    reach = std::min(reach, (centre_of(*silhouette.photo) - middle).norm());
   Box box{middle.array() - reach, middle.array() + reach};
   for (int round = 0; round < 2; ++round) {
     ScalarGrid grid = grid_over(box, coarse);
@@ -201,10 +205,13 @@ Box found_box(const std::vector<Silhouette>& silhouettes, const std::string& sou
     // Thin parts pass between the corners of a coarse grid: whatever comes within a cell counts.
     const auto narrowed = box_above(grid, -static_cast<float>(grid.spacing));
     if (!narrowed)
-      throw InputError(source, "--proxy hull", "has no point that lies in all silhouettes: are masks white on the shape, and the poses right?");
-    if (round == 0 && ((narrowed->low - box.low).minCoeff() < grid.spacing || (box.high - narrowed->high).minCoeff() < grid.spacing))
       throw InputError(source, "--proxy hull",
-                       "is not closed by its silhouettes: photograph the shape from more sides, or give hull:N,x0,y0,z0,x1,y1,z1");
+                       "has no point that lies in all silhouettes: are masks white on the shape, and the poses right?");
+    if (round == 0 &&
+        ((narrowed->low - box.low).minCoeff() < grid.spacing || (box.high - narrowed->high).minCoeff() < grid.spacing))
+      throw InputError(
+          source, "--proxy hull",
+          "is not closed by its silhouettes: photograph the shape from more sides, or give hull:N,x0,y0,z0,x1,y1,z1");
     box = {narrowed->low.array() - grid.spacing, narrowed->high.array() + grid.spacing};
   }
   return box;
@@ -250,7 +257,8 @@ TriangleMesh visual_hull(const PhotoSet& set, const HullOptions& options) {
     if (!photo.mask.empty()) silhouettes.push_back({&photo, {}});
   if (silhouettes.size() < static_cast<std::size_t>(least_photos))
     throw InputError(set.source, "--proxy hull",
-                     "needs two photos with silhouettes at least: masks (COLMAP's masks/NAME.png, mask_path), pictures with alpha, or --mask-below");
+                     "needs two photos with silhouettes at least: masks (COLMAP's masks/NAME.png, mask_path), pictures "
+                     "with alpha, or --mask-below");
   tbb::parallel_for(std::size_t{0}, silhouettes.size(),
                     [&](std::size_t i) { silhouettes[i].distance = signed_distance(silhouettes[i].photo->mask); });
   const Box box = options.box ? Box{(*options.box)[0], (*options.box)[1]} : found_box(silhouettes, set.source);
@@ -258,7 +266,8 @@ TriangleMesh visual_hull(const PhotoSet& set, const HullOptions& options) {
   carve(silhouettes, grid);
   TriangleMesh mesh = zero_surface(grid);
   if (mesh.triangles.empty())
-    throw InputError(set.source, "--proxy hull", "has no point in all silhouettes: give a finer resolution, hull:N, or mend the masks");
+    throw InputError(set.source, "--proxy hull",
+                     "has no point in all silhouettes: give a finer resolution, hull:N, or mend the masks");
   return mesh;
 }
 

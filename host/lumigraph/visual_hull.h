@@ -25,10 +25,9 @@ struct HullOptions {
 //
 // A point is in it when every photo that has it in its picture shows it inside of the silhouette, and two photos at
 // least have it. Each photo gives the signed distance to its outline, in pixels times depth / focal length: about
-// metres; the hull's field is the least of them, and its zero surface is drawn by marching tetrahedra. A photo without a
-// mask says nothing.
-// Throws InputError: fewer than two photos with a mask; no point in all silhouettes; silhouettes that do not close the
-// shape.
+// metres; the hull's field is the least of them, and its zero surface is drawn by marching tetrahedra. A photo without
+// a mask says nothing. Throws InputError: fewer than two photos with a mask; no point in all silhouettes; silhouettes
+// that do not close the shape.
 [[nodiscard]] TriangleMesh visual_hull(const PhotoSet&, const HullOptions&);
 
 // Signed distance to a mask's outline at each pixel's centre, pixels: above 0 inside. Straight distances, exact within

@@ -54,18 +54,17 @@ class EmitterLight {
   }
 
  private:
-  static constexpr int points = 5;  // along each side of the box
-  static constexpr int rings = 3;   // of points over the emitter's disc
+  static constexpr int points = 5;    // along each side of the box
+  static constexpr int on_disc = 54;  // points over the emitter's
 
   void add_seen_from(const Eigen::Vector3f& x, const ShadedEmitter& e, std::vector<double>& light) const {
     const Rigid3& world_from_plane = field_.plane.world_from_plane;
     const Eigen::Vector3f to = (world_from_plane.inverse() * e.emitter.position.cast<double>()).cast<float>() - x;
     const Eigen::Vector3f across = to.unitOrthogonal(), up = to.normalized().cross(across);
     const float sine = e.emitter.radius_m / std::max(to.norm(), e.emitter.radius_m);
-    constexpr int samples = 6 * rings * rings;
-    const float weight = std::numbers::pi_v<float> * sine * sine / (samples * points * points * points);
-    for (int k = 0; k < samples; ++k) {  // equal areas
-      const float radius = e.emitter.radius_m * std::sqrt((static_cast<float>(k) + 0.5F) / samples);
+    const float weight = std::numbers::pi_v<float> * sine * sine / (on_disc * points * points * points);
+    for (int k = 0; k < on_disc; ++k) {  // equal areas
+      const float radius = e.emitter.radius_m * std::sqrt((static_cast<float>(k) + 0.5F) / on_disc);
       const float angle = static_cast<float>(k) * 2.3999632F;  // golden
       const Eigen::Vector3f d = (to + radius * (std::cos(angle) * across + std::sin(angle) * up)).normalized();
       if (d.z() < 0.02F) continue;  // looks along the plane: outside every rectangle

@@ -16,6 +16,8 @@ Panel::Panel(const Window& window, std::string keys) : window_(window), keys_(st
   ImGui::SetNextWindowSize({static_cast<float>(panel_width_px), static_cast<float>(window.height())});
   ImGui::Begin("panel", nullptr, ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoResize | ImGuiWindowFlags_NoMove);
   ImGui::PushTextWrapPos();
+  constexpr float slider_width_px = 180;  // leaves room for the longest name
+  ImGui::PushItemWidth(slider_width_px);
 }
 
 Panel::~Panel() {
@@ -23,21 +25,22 @@ Panel::~Panel() {
   ImGui::TextUnformatted(keys_.c_str());
   ImGui::TextUnformatted("F12: screenshot    Ctrl+Q: close");
   ImGui::TextUnformatted(window_.notice().c_str());
+  ImGui::PopItemWidth();
   ImGui::PopTextWrapPos();
   ImGui::End();
 }
 
-void ShownPicture::set(const ImageU8& picture) {
+void ShownPicture::set(const ImageU8& picture, Enlarged enlarged) {
   check(!picture.empty() && (picture.channels == 1 || picture.channels == 3), "a grey or RGB picture");
   if (texture_.name() == 0) {
     texture_ = make_texture();
     glBindTexture(GL_TEXTURE_2D, texture_.name());
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
-    glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   }
   glBindTexture(GL_TEXTURE_2D, texture_.name());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, enlarged == Enlarged::smooth ? GL_LINEAR : GL_NEAREST);
   const bool grey = picture.channels == 1;
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_G, grey ? GL_RED : GL_GREEN);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_SWIZZLE_B, grey ? GL_RED : GL_BLUE);

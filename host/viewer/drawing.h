@@ -31,9 +31,11 @@ class Panel {
 // A picture on the graphics side, drawn behind the panels.
 class ShownPicture {
  public:
+  // How pixels that are larger than the screen's look: squares, as data, or without edges, as a photo.
+  enum class Enlarged { sharp, smooth };
   // 8 bits, 1 or 3 channels, not empty; its first row is shown at the top. Replaces what was there.
-  void set(const ImageU8&);
-  // Into the box; nothing before the first set(). Pixels that are larger than the screen's stay sharp.
+  void set(const ImageU8&, Enlarged = Enlarged::sharp);
+  // Into the box; nothing before the first set().
   void draw(const Box&) const;
 
  private:

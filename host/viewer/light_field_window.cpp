@@ -21,7 +21,8 @@ class LightFieldWindow {
         title_(std::move(title)),
         view_(std::move(field)),
         irradiance_exposure_(display_exposure(view_.irradiance())),
-        radiance_exposure_(display_exposure(view_.hemisphere(256))) {}
+        radiance_exposure_(display_exposure(view_.hemisphere(glance_px))),
+        nearest_m_(nearest_of(view_.inverse_distances(glance_px))) {}
 
   void run() {
     while (window_.begin_frame()) {
@@ -52,7 +53,8 @@ class LightFieldWindow {
       probe_moved_ = true;
     }
     if (!view_.field().surroundings.is_plane() &&
-        ImGui::SliderFloat("white at", &nearest_m_, 0.1F, 10, "%.2f m", ImGuiSliderFlags_Logarithmic))
+        ImGui::SliderFloat("white at", &nearest_m_, nearest_of_slider_m, farthest_of_slider_m, "%.2f m",
+                           ImGuiSliderFlags_Logarithmic))
       exposure_moved_ = true;
     ImGui::Separator();
     ImGui::TextUnformatted(title_.c_str());
@@ -125,13 +127,22 @@ class LightFieldWindow {
   }
 
   static constexpr int panorama_width_px = 512;
+  static constexpr int glance_px = 256;  // of pictures that only choose what the first ones look like
+
+  // What is white at first: the nearest that the first point sees, within the slider's ends.
+  static float nearest_of(const ImageF& inverse_distances) {
+    if (inverse_distances.empty()) return nearest_of_slider_m;
+    const float largest = *std::max_element(inverse_distances.data.begin(), inverse_distances.data.end());
+    return std::clamp(1 / std::max(largest, 1 / farthest_of_slider_m), nearest_of_slider_m, farthest_of_slider_m);
+  }
+  static constexpr float nearest_of_slider_m = 0.1F, farthest_of_slider_m = 10;
 
   Window& window_;
   std::string title_;
   LightFieldView view_;
   double irradiance_exposure_, radiance_exposure_;  // at 0 stops
+  float nearest_m_;                                 // shown white
   float stops_ = 0;
-  float nearest_m_ = 0.5F;
   LightFieldLayout layout_;
   DraggedPoint drag_;
   ShownPicture plane_, hemisphere_, distances_, panorama_;

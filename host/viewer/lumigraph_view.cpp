@@ -108,8 +108,8 @@ ImageU8 LumigraphView::render(const View& view, double stops) const {
   return to_srgb8(std::get<ImageF>(made.picture), exposure_ * std::exp2(stops));
 }
 
-std::vector<ViewWeight> LumigraphView::weights_at(const Eigen::Vector2d& position) const {
-  const View whole = view(lens_.width);
+std::vector<ViewWeight> LumigraphView::weights_at(const Eigen::Vector2d& position, int width_px) const {
+  const View whole = view(width_px);
   return lumigraph_.weights_at(whole, {position.x() * whole.camera.width, position.y() * whole.camera.height},
                                options_);
 }

@@ -29,6 +29,9 @@ class LumigraphView {
   void jump(std::size_t photo);  // to a photo's place, with its lens
   [[nodiscard]] double aspect() const;
   [[nodiscard]] View view(int width_px) const;
+  // The photos' own width: a finer picture shows nothing more, and its resolution term would let other photos speak at
+  // a photo's own place.
+  [[nodiscard]] int largest_width_px() const { return lens_.width; }
 
   // Of what the middle of the picture shows, along the optical axis; else the distance of the focus as it is.
   [[nodiscard]] double depth_ahead() const;
@@ -51,8 +54,8 @@ class LumigraphView {
   [[nodiscard]] ImageU8 render(const View&, double stops) const;
   [[nodiscard]] bool is_linear() const { return exposure_ > 0; }
 
-  // Which photos speak for a position of the picture, best first.
-  [[nodiscard]] std::vector<ViewWeight> weights_at(const Eigen::Vector2d& position) const;
+  // Which photos speak for a position of the picture of that width, best first.
+  [[nodiscard]] std::vector<ViewWeight> weights_at(const Eigen::Vector2d& position, int width_px) const;
 
  private:
   Lumigraph lumigraph_;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <imgui.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <numbers>
@@ -27,15 +28,9 @@ class LumigraphWindow {
   void run() {
     while (window_.begin_frame()) {
       box_ = fitted(picture_room(window_.width(), window_.height()), view_.aspect());
-      const Panel panel(window_,
-                        "Drag: orbit    right: turn    middle: shift\nwheel: nearer    Shift+wheel: focus\n"
-                        "W A S D Q E: fly    B: blending field\nP: face the plane    K: key view    R: render path");
-      draw_settings();
       take_pointer();
       take_keys();
-      draw_weights();
-      draw_path();
-      draw_photos();
+      draw_panel();
       draw_picture();
       window_.end_frame();
     }
@@ -91,7 +86,7 @@ class LumigraphWindow {
 
   void take_keys() {
     if (window_.pressed('B')) toggle_blending_field();
-    if (window_.pressed('K')) recorder_.add_key(view_.view(box_.width));
+    if (window_.pressed('K')) recorder_.add_key(view_.view(full_width()));
     if (window_.pressed('P') && view_.has_focus()) {
       view_.face_plane();
       changed();
@@ -110,6 +105,16 @@ class LumigraphWindow {
     const double seconds = std::min(static_cast<double>(ImGui::GetIO().DeltaTime), longest_step_s);
     navigate(moved(view_.navigation(), way.normalized() * *flight_speed_ * seconds));
     window_.hurry();
+  }
+
+  void draw_panel() {
+    const Panel panel(window_,
+                      "Drag: orbit    right: turn    middle: shift\nwheel: nearer    Shift+wheel: focus\n"
+                      "W A S D Q E: fly    B: blending field\nP: face the plane    K: key view    R: render path");
+    draw_settings();
+    draw_weights();
+    draw_path();
+    draw_photos();
   }
 
   void draw_settings() {
@@ -160,9 +165,11 @@ class LumigraphWindow {
     constexpr float lines_height_px = 120;
     ImGui::BeginChild("weights", {0, lines_height_px});
     if (position_) {
-      const std::vector<ViewWeight> weights = view_.weights_at(*position_);
+      const std::vector<ViewWeight> weights = view_.weights_at(*position_, full_width());
       if (weights.empty()) ImGui::TextUnformatted("no photo shows this");
       for (const ViewWeight& w : weights) {
+        constexpr float least_shown = 0.0005F;  // would read 0.0 %
+        if (w.weight < least_shown) continue;
         ImGui::PushID(static_cast<int>(w.view));
         swatch(w.view);
         ImGui::TextUnformatted(
@@ -175,7 +182,7 @@ class LumigraphWindow {
 
   void draw_path() {
     ImGui::Separator();
-    if (ImGui::Button("add key view")) recorder_.add_key(view_.view(box_.width));
+    if (ImGui::Button("add key view")) recorder_.add_key(view_.view(full_width()));
     ImGui::SameLine();
     ImGui::BeginDisabled(recorder_.keys().empty());
     if (ImGui::Button("drop last")) recorder_.drop_last_key();
@@ -220,16 +227,20 @@ class LumigraphWindow {
     ImGui::EndChild();
   }
 
+  // Of a picture at rest, pixels.
+  [[nodiscard]] int full_width() const { return std::min(box_.width, view_.largest_width_px()); }
+
   // While something moves, pictures are as large as time allows; then one of full size.
   void draw_picture() {
-    if (box_.width != rendered_width_) full_size_waits_ = true;
+    if (full_width() != rendered_width_) full_size_waits_ = true;
     if (moved_ || full_size_waits_) {
       const int divisor = moved_ ? pace_.divisor() : 1;
       const auto start = std::chrono::steady_clock::now();
-      picture_.set(view_.render(view_.view(std::max(1, box_.width / divisor)), static_cast<double>(stops_)));
+      const View view = view_.view(std::max(1, full_width() / divisor));
+      picture_.set(view_.render(view, static_cast<double>(stops_)), ShownPicture::Enlarged::smooth);
       pace_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), divisor);
       full_size_waits_ = divisor > 1;
-      rendered_width_ = box_.width;
+      rendered_width_ = full_width();
       if (full_size_waits_) window_.hurry();
       moved_ = false;
     }

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -52,9 +53,11 @@ class VertexWeights {
                            static_cast<float>(view_.camera.fx() * view_.camera.fy())};
     std::vector<std::vector<ViewPenalty>> candidates(count);
     std::array<float, largest_bundle> weight;
+    std::array<float, largest_bundle> worst;
+    worst.fill(std::numeric_limits<float>::infinity());
     for (std::uint32_t v = 0; v < answering_.size(); ++v) {
       const RayAnswers answers{part(7), part(8), part(9), std::span(weight).first(count), part(10)};
-      answer(answering_[v], bundle, options_.penalty, 1, answers);
+      answer(answering_[v], bundle, options_.penalty, 1, worst, answers);
       for (std::size_t i = 0; i < count; ++i) candidates[i].push_back({v, row[10][i]});
     }
     for (std::size_t i = 0; i < count; ++i) {

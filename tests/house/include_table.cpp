@@ -40,9 +40,9 @@ bool contains(const Names& names, std::string_view name) {
 
 // The C++ standard library has no dots in its names; of POSIX and Linux, these folders and these files.
 bool is_system_header(std::string_view header) {
-  static const Names posix{"sys/",      "netinet/", "arpa/",     "net/",    "dlfcn.h",  "unistd.h",
-                           "fcntl.h",   "poll.h",   "pthread.h", "netdb.h", "signal.h", "dirent.h",
-                           "termios.h", "endian.h", "ifaddrs.h", "grp.h"};
+  static const Names posix{"sys/",      "netinet/", "arpa/",     "net/",    "dlfcn.h",  "malloc.h", "unistd.h",
+                           "fcntl.h",   "poll.h",   "pthread.h", "netdb.h", "signal.h", "dirent.h", "termios.h",
+                           "endian.h",  "ifaddrs.h", "grp.h",    "spawn.h"};
   return header.find('.') == std::string_view::npos || starts_with_any(header, posix);
 }
 

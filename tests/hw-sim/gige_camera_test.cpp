@@ -65,15 +65,16 @@ class GigeCameraTest : public testing::Test {
   CaptureResult record(const GigeCameraOptions& o, const std::atomic<bool>& stop) {
     return capture([&] { return open_aravis_source(client(o)); }, folder_ / "s", test::header_with_target(), {}, stop);
   }
-  // Frames that differ from what the camera sent.
+  // Frames that differ from what the camera sent. All are looked at up to 200, then as many spread over the recording.
   int wrong_frames(const GigeCameraOptions& o) {
     const SessionReader reader(folder_ / "s");
     int wrong = 0;
-    for (const SessionFrame& frame : reader.frames())
-      wrong += std::get<ImageU16>(reader.read_frame(frame).pixels).data !=
-                       codes_of(static_cast<std::uint64_t>(frame.arrival->device_frame), o)
-                   ? 1
-                   : 0;
+    const std::size_t step = (reader.frames().size() + 199) / 200;
+    for (std::size_t i = 0; i < reader.frames().size(); i += step) {
+      const SessionFrame& frame = reader.frames()[i];
+      const auto sent = static_cast<std::uint64_t>(frame.arrival->device_frame);
+      wrong += std::get<ImageU16>(reader.read_frame(frame).pixels).data != codes_of(sent, o) ? 1 : 0;
+    }
     return wrong;
   }
   test::TemporaryFolder folder_;
@@ -273,7 +274,7 @@ TEST_F(GigeCameraTest, LostPacketsAreAskedForAgain) {
   GigeCamera server(o, fill);
   std::atomic<bool> stop = false;
   std::thread watch([&] {
-    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(10 + o.most_frames / 20);
+    const auto patience = std::chrono::steady_clock::now() + std::chrono::seconds(10 + o.most_frames / 5);
     while (server.counts().frames < o.most_frames && std::chrono::steady_clock::now() < patience)
       std::this_thread::sleep_for(milliseconds(50));
     std::this_thread::sleep_for(milliseconds(800));  // what is still asked for again

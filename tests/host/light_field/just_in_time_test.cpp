@@ -25,7 +25,7 @@ Eigen::Vector3f lamp_and_sky(const Eigen::Vector3f& o, const Eigen::Vector3f& d)
   return {0.2F + 0.1F * d.x(), 0.2F, 0.1F + 0.2F * d.z()};
 }
 
-class JustInTime : public testing::Test {
+class JustInTime : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     views_ = new std::vector(testing::analytic_views(200, 0.25F, 96, lamp_and_sky));
@@ -33,10 +33,10 @@ class JustInTime : public testing::Test {
     options.directions = 700;
     options.size = 32;
     options.proxy = "sphere:1.2";
-    const Resampling focused(*views_, square, options, {});
+    const Resampling focused(*views_, square, options, Team(), Progress());
     focused_ = new LightField(focused.field());
     penalty_ = focused.penalty();
-    whole_ = new LightField(resample(*views_, square, options, {}).field);
+    whole_ = new LightField(resample(*views_, square, options, Progress()).field);
   }
   static void TearDownTestSuite() {
     delete views_;

@@ -38,19 +38,23 @@ Change walk(const Lumigraph& lumigraph, const View& start, double depth, int ste
   const double step = step_px * depth / start.camera.fx();
   Change change;
   ImageF last;
+  ImageU8 last_covered;
   for (int i = 0; i < steps; ++i) {
     View view = start;
     view.cam_from_world.translation.x() -= i * step;
     const LumigraphPicture picture = lumigraph.render(view, {});
     const auto& now = std::get<ImageF>(picture.picture);
     for (int y = 0; i > 0 && y < now.height; ++y)
-      for (int x = 0; x < now.width; ++x)
+      for (int x = 0; x < now.width; ++x) {
+        if (picture.covered.at(x, y) == 0 || last_covered.at(x, y) == 0) continue;  // beyond all photos
         for (int c = 0; c < 3; ++c) {
           const double explained = (step_px + more_px) * local_gradient(now, x, y, c);
           const double differs = std::abs(now.at(x, y, c) - last.at(x, y, c));
           change.worst_unexplained = std::max(change.worst_unexplained, differs - explained);
         }
+      }
     last = now;
+    last_covered = picture.covered;
   }
   return change;
 }
@@ -98,7 +102,6 @@ TEST(Continuity, VisibilityFadesToo) {
   const View start{pinhole(96, 45), looking({1.2, -1.6, 3}, {0, 0, -0.4})};
   const double step = step_px * 3.6 / start.camera.fx();
   ImageF last;
-  ImageU8 last_covered;
   int compared = 0;
   for (int i = 0; i < 40; ++i) {
     View view = start;

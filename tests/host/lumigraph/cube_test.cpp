@@ -20,7 +20,7 @@ TEST(LumigraphOfACube, ForetellsLeftOutPhotos) {
   const LeaveOneOut result = leave_one_out(lumigraph, set, {});
   EXPECT_GT(result.psnr_db, 29.5);
   EXPECT_GT(result.psnr_db, result.nearest_view_psnr_db + 1.4);
-  EXPECT_NEAR(result.nearest_view_psnr_db, 28.04, 0.2);
+  EXPECT_NEAR(result.nearest_view_psnr_db, 28.04, 0.3);
   for (const LeftOutView& view : result.views) EXPECT_GT(view.covered, 0.8) << view.name;
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double reflectance = 0.8;
 constexpr float frame_value = 0.016F;  // of everything that is no mirror: radiance 1, the room has less
-constexpr double room_m = 3;      // radius of a round room about the world's origin
+constexpr double room_m = 3;           // radius of a round room about the world's origin
 
 // A capture of a painted room in a mirror, its frames by reflecting each pixel's ray at the mirror's plane. Nothing of
 // the code under test is used.
@@ -72,7 +72,8 @@ class MirrorCapture : public ::testing::Test {
         const Eigen::Vector3d d = camera.unproject({x + 0.5, y + 0.5}).value().normalized();
         const double t = normal.dot(cam_from_mirror.translation) / normal.dot(d);
         const Eigen::Vector3d on_mirror = cam_from_mirror.inverse() * Eigen::Vector3d(t * d);
-        if (!(t > 0) || std::abs(on_mirror.x()) > opening_.x() / 2 || std::abs(on_mirror.y()) > opening_.y() / 2) continue;
+        if (!(t > 0) || std::abs(on_mirror.x()) > opening_.x() / 2 || std::abs(on_mirror.y()) > opening_.y() / 2)
+          continue;
         const Eigen::Vector3d away = world_from_cam.rotation * (d - 2 * normal.dot(d) * normal);
         const Eigen::Vector3d from = world_from_cam * Eigen::Vector3d(t * d);
         const double b = from.dot(away);
@@ -114,7 +115,8 @@ TEST_F(MirrorCapture, PhotosAreOfTheRoomWithTheCamerasBehindTheMirror) {
         const double b = from.dot(d);
         const Eigen::Vector3d wall = from + (-b + std::sqrt(b * b + room_m * room_m - from.squaredNorm())) * d;
         const Eigen::Vector3f radiance = radiance_at(wall);
-        for (int c = 0; c < 3; ++c) ASSERT_NEAR(picture.at(x, y, c), radiance[c], 0.01F) << photo.name << x << ", " << y;
+        for (int c = 0; c < 3; ++c)
+          ASSERT_NEAR(picture.at(x, y, c), radiance[c], 0.01F) << photo.name << x << ", " << y;
       }
     EXPECT_GT(shown, 200) << photo.name;
   }

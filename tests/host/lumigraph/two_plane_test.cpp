@@ -77,13 +77,14 @@ TEST_F(TwoPlaneSet, ReadAgainReturnsItsPictures) {
     const LumigraphPicture again = light_field.render(view, {});
     ImageU8 both = again.covered;
     for (std::size_t p = 0; p < both.data.size(); ++p)
-      both.data[p] = both.data[p] != Covered::nothing && truth.covered.data[p] != Covered::nothing ? Covered::seen : Covered::nothing;
+      both.data[p] = both.data[p] != Covered::nothing && truth.covered.data[p] != Covered::nothing ? Covered::seen
+                                                                                                   : Covered::nothing;
     EXPECT_GT(psnr_db(again.picture, truth.picture, both), 45) << i;
   }
 }
 
-// Between the cameras a light field is what the lumigraph itself shows there, as far as its grid and the plane that it is
-// focused on allow: with the scene's shape as proxy nearly exactly.
+// Between the cameras a light field is what the lumigraph itself shows there, as far as its grid and the plane that it
+// is focused on allow: with the scene's shape as proxy nearly exactly.
 TEST_F(TwoPlaneSet, AViewBetweenTheCamerasIsTheLumigraphs) {
   const Lumigraph lumigraph = source();
   const TwoPlane planes = tilted_planes();
@@ -123,11 +124,11 @@ TEST(TwoPlaneLayout, IsRefusedWithItsField) {
     return test::input_error_of([&] { static_cast<void>(two_plane_from_json(layout, "layout.json")); });
   };
   for (const auto& [key, value] : std::vector<std::pair<const char*, nlohmann::json>>{{"cameras", {0, 3}},
-                                                                                       {"uv_size_m", {-1, 1}},
-                                                                                       {"st_distance_m", 0},
-                                                                                       {"st_size_m", {1}},
-                                                                                       {"size_px", {1, 100000}},
-                                                                                       {"grid", 3}}) {
+                                                                                      {"uv_size_m", {-1, 1}},
+                                                                                      {"st_distance_m", 0},
+                                                                                      {"st_size_m", {1}},
+                                                                                      {"size_px", {1, 100000}},
+                                                                                      {"grid", 3}}) {
     const std::string line = refused(key, value);
     EXPECT_TRUE(test::contains(line, "layout.json")) << line;
     EXPECT_TRUE(test::contains(line, key)) << line;
@@ -141,7 +142,8 @@ TEST(TwoPlaneFit, CoversWhereThePhotosWereAndWhatTheySaw) {
   for (int i = 0; i < 49; ++i) {
     const double x = 0.2 * (i % 7 - 3);
     const double y = 0.1 * (i / 7 - 3);
-    set.photos.push_back(test::photo_of(std::to_string(i), {pinhole(64, 40), looking({x, y, 3}, {x, y, 0})}, wall, blotches(0.4F)));
+    set.photos.push_back(
+        test::photo_of(std::to_string(i), {pinhole(64, 40), looking({x, y, 3}, {x, y, 0})}, wall, blotches(0.4F)));
   }
   const Lumigraph lumigraph(set, wall);
   const TwoPlane planes = fitted_two_plane(lumigraph, set, {5, 4}, {});

@@ -24,8 +24,8 @@ constexpr double pi = std::numbers::pi;
 double volume_of(const TriangleMesh& mesh) {  // divergence theorem: positive when triangles turn outwards
   double six = 0;
   for (const auto& [a, b, c] : mesh.triangles)
-    six += mesh.positions[a].cast<double>().dot(
-        mesh.positions[b].cast<double>().cross(mesh.positions[c].cast<double>()));
+    six +=
+        mesh.positions[a].cast<double>().dot(mesh.positions[b].cast<double>().cross(mesh.positions[c].cast<double>()));
   return six / 6;
 }
 
@@ -52,7 +52,8 @@ PosedPhoto silhouette_of(const Shape& shape, const View& view, const std::string
   const Rigid3 world_from_cam = view.cam_from_world.inverse();
   for (int y = 0; y < photo.mask.height; ++y)
     for (int x = 0; x < photo.mask.width; ++x)
-      if (shape(world_from_cam.translation, world_from_cam.rotation * view.camera.unproject({x + 0.5, y + 0.5}).value()))
+      if (shape(world_from_cam.translation,
+                world_from_cam.rotation * view.camera.unproject({x + 0.5, y + 0.5}).value()))
         photo.mask.at(x, y) = 255;
   return photo;
 }
@@ -131,7 +132,8 @@ TEST(VisualHull, OfABallIsTheBall) {
   for (const int resolution : {32, 96}) {
     const TriangleMesh hull = visual_hull(set, {resolution, {}});
     EXPECT_TRUE(is_watertight(hull));
-    const double error = volume_of(TriangleMesh(transformed({Eigen::Quaterniond::Identity(), -centre}, hull))) / truth - 1;
+    const double error =
+        volume_of(TriangleMesh(transformed({Eigen::Quaterniond::Identity(), -centre}, hull))) / truth - 1;
     std::printf("ball, %d cells: volume %+.2f %%\n", resolution, 100 * error);
     EXPECT_GT(error, -0.01);  // a hull is never smaller, but for the pixels of its outlines
     EXPECT_LT(error, 0.02);
@@ -158,7 +160,8 @@ TEST(VisualHull, IsRefusedWhenSilhouettesSayNothingOrContradict) {
   for (PosedPhoto& photo : bare.photos) photo.mask = {};
   EXPECT_TRUE(test::contains(test::input_error_of([&] { static_cast<void>(visual_hull(bare, {})); }), "--mask-below"));
   std::fill(set.photos[3].mask.data.begin(), set.photos[3].mask.data.end(), std::uint8_t{0});
-  EXPECT_TRUE(test::contains(test::input_error_of([&] { static_cast<void>(visual_hull(set, {})); }), "in all silhouettes"));
+  EXPECT_TRUE(
+      test::contains(test::input_error_of([&] { static_cast<void>(visual_hull(set, {})); }), "in all silhouettes"));
 }
 
 TEST(VisualHull, OfDarkBackgroundsComesFromThePictures) {
@@ -174,7 +177,8 @@ TEST(VisualHull, OfDarkBackgroundsComesFromThePictures) {
   for (std::size_t i = 0; i < set.photos.size(); ++i) EXPECT_EQ(set.photos[i].mask.data, masked.photos[i].mask.data);
 }
 
-// The cameras of a real turntable rig, and a shape with ears, hollows and open edges. The hull must have its silhouettes.
+// The cameras of a real turntable rig, and a shape with ears, hollows and open edges. The hull must have its
+// silhouettes.
 TEST(VisualHull, OfTheStagesMeshHasItsSilhouettes) {
   const std::filesystem::path folder = std::filesystem::path(MF_SHARED_DATA) / "stage";
   if (!std::filesystem::exists(folder / "truth.json")) GTEST_SKIP() << "no " << folder;
@@ -189,7 +193,8 @@ TEST(VisualHull, OfTheStagesMeshHasItsSilhouettes) {
   for (std::size_t i = 0; i < truth.at("views").size(); i += 2) {
     View view;
     view.camera = test::pinhole(256, 45);
-    view.camera.parameters = {truth["K"][0][0].get<double>() * scale, truth["K"][1][1].get<double>() * scale, 128, 128, 0, 0, 0, 0, 0};
+    view.camera.parameters = {
+        truth["K"][0][0].get<double>() * scale, truth["K"][1][1].get<double>() * scale, 128, 128, 0, 0, 0, 0, 0};
     view.cam_from_world = rigid3_from_json(truth["views"][i]["cam_from_world"], "cam_from_world", "truth.json");
     set.photos.push_back(silhouette_of(meets, view, std::to_string(i)));
   }
@@ -211,7 +216,8 @@ TEST(VisualHull, OfTheStagesMeshHasItsSilhouettes) {
       either += a || b ? 1 : 0;
     }
   }
-  std::printf("stage: silhouettes agree in %.2f %% of their pixels; %zu triangles\n", 100 * common / either, mesh.triangles.size());
+  std::printf("stage: silhouettes agree in %.2f %% of their pixels; %zu triangles\n", 100 * common / either,
+              mesh.triangles.size());
   EXPECT_GT(common / either, 0.97);
 }
 

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "host/render/incident_light.h"
+#include "host/render/irradiance.h"
+#include "host/tracing/ray_scene.h"
 #include "tests/host/render/scenes.h"
 
 namespace mf {
@@ -58,7 +60,9 @@ TEST(Importance, TheLampIsTakenApartAndTheDimIsNot) {
   double of_lamp = 0, widest = 0;
   for (const CellGroup& group : groups_of(field, 200)) {
     const bool bright = group.direction.dot(lamp) > std::cos(0.06F);
-    if (bright) EXPECT_EQ(group.cells.size(), 1U);
+    if (bright) {
+      EXPECT_EQ(group.cells.size(), 1U);
+    }
     of_lamp += bright ? 1 : 0;
     widest = std::max(widest, static_cast<double>(group.cells.size()));
   }

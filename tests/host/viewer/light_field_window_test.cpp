@@ -70,7 +70,7 @@ TEST_F(LightFieldWindow, TheExposureSliderBrightensEveryPicture) {
   const Vector2d panorama = layout_.panorama.pixel_of({0.25, 0.3}), plane = layout_.plane.pixel_of({0.1, 0.3});
   ASSERT_TRUE(display.becomes([&](const ImageU8& s) { return colour_at(s, panorama).z() > 0; }));
   const ImageU8 before = display.screen();
-  const Vector2d slider(110, 18);  // the first row of the panel; its middle is 0 stops
+  const Vector2d slider(98, 18);  // the first row of the panel; its middle is 0 stops
   display.drag({slider, slider + Vector2d(30, 0)});
   EXPECT_TRUE(display.becomes([&](const ImageU8& s) {
     return colour_at(s, dim).z() > colour_at(before, dim).z() + 20 &&
@@ -83,7 +83,7 @@ TEST_F(LightFieldWindow, AScreenshotIsWhatTheScreenShows) {
   const VirtualDisplay display(width, height);
   test::ChildProcess program(command_);
   ASSERT_TRUE(display.becomes([&](const ImageU8& s) { return colour_at(s, lamp_on_disc_).x() > 100; }));
-  display.point_at(layout_.hemisphere.pixel_of({0.5, 0.5}));
+  display.point_at({panel_width_px / 2.0, height / 2.0});  // the arrow is on the screen only
   const std::filesystem::path file = folder_ / "view_0001.png";
   display.press("F12");
   ASSERT_TRUE(display.becomes([&](const ImageU8&) { return std::filesystem::exists(file); }));

@@ -58,8 +58,8 @@ TEST(LumigraphView, IsSharpWhereItIsFocused) {
   view.navigate(moved(view.navigation(), {0.15, 0, 0}));
   const ImageU8 truth = wall_picture(view_from(0.15));
   EXPECT_LT(mean_difference(view.render(view.view(160), 0), truth), 1.5);
-  view.focus_at(1.5);
-  EXPECT_NEAR(view.depth_ahead(), 1.5, 1e-5);
+  view.focus_at(1);
+  EXPECT_NEAR(view.depth_ahead(), 1, 1e-5);
   EXPECT_GT(mean_difference(view.render(view.view(160), 0), truth), 6);
   view.focus_at(wall_distance_m);
   EXPECT_LT(mean_difference(view.render(view.view(160), 0), truth), 1.5);
@@ -93,15 +93,15 @@ TEST(LumigraphView, OrbitsAboutWhatItShows) {
 TEST(LumigraphView, TellsWhoSpeaks) {
   LumigraphView view = wall_view();
   view.jump(3);
-  const auto alone = view.weights_at({0.4, 0.6});
+  const auto alone = view.weights_at({0.4, 0.6}, 160);
   ASSERT_FALSE(alone.empty());
   EXPECT_EQ(alone.front().view, 3U);
   EXPECT_GT(alone.front().weight, 0.99F);
   view.navigate(moved(view.navigation(), {-0.15, 0, 0}));
   float sum = 0;
-  for (const ViewWeight& w : view.weights_at({0.5, 0.5})) sum += w.weight;
+  for (const ViewWeight& w : view.weights_at({0.5, 0.5}, 160)) sum += w.weight;
   EXPECT_NEAR(sum, 1, 1e-5);
-  EXPECT_NEAR(view.weights_at({0.5, 0.5}).front().weight, view.weights_at({0.5, 0.5})[1].weight, 0.02);
+  EXPECT_NEAR(view.weights_at({0.5, 0.5}, 160).front().weight, view.weights_at({0.5, 0.5}, 160)[1].weight, 0.02);
 }
 
 TEST(LumigraphView, BlendingFieldShowsThePhotosOwnColour) {

@@ -47,7 +47,7 @@ TEST_F(SessionWindow, ShowsTheDirectionsCaughtUnderThePointer) {
   const double middle_y = caption_height_px + (height - caption_height_px - 8) / 2.0;
   const auto on_plane = [&](double fraction) { return Vector2d(room.x + fraction * (room.width / 2 - 8), middle_y); };
   display.click(on_plane(0.2));
-  EXPECT_TRUE(display.becomes([&](const ImageU8& s) { return dots(s) >= 20; })) << dots(display.screen());
+  EXPECT_TRUE(display.becomes([&](const ImageU8& s) { return dots(s) >= 10; })) << dots(display.screen());
   display.click(on_plane(0.55));
   EXPECT_TRUE(display.becomes([&](const ImageU8& s) { return dots(s) == 0; })) << dots(display.screen());
 }
