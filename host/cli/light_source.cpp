@@ -29,7 +29,7 @@ std::vector<double> light_of_capture(const Capture& capture, const Bounds& objec
   std::vector<TileRequest> requests;
   for (std::uint32_t i = 0; i < field.directions.size(); ++i)
     requests.push_back({{i}, field.plane.min_m.cast<float>(), field.plane.max_m.cast<float>()});
-  const std::vector<PlaneTile> tiles = resample_just_in_time(capture.views, field, capture.k, requests, {});
+  const std::vector<PlaneTile> tiles = resample_just_in_time(capture.views, field, capture.penalty, requests, {});
   std::vector<PlaneImage> images;
   for (const PlaneTile& tile : tiles) images.push_back(tile.image());
   return light_of_tiles(field.directions, images);
@@ -43,7 +43,7 @@ IncidentLight light_of(const Capture& capture, const Bounds& object, const Light
   seconds["choosing"] = seconds_since(start);
   start = Clock::now();
   std::vector<PlaneTile> tiles =
-      resample_just_in_time(capture.views, field, capture.k, plan.requests, quality(field, options));
+      resample_just_in_time(capture.views, field, capture.penalty, plan.requests, quality(field, options));
   IncidentLight light = incident_light(field.directions, field.plane, plan, std::move(tiles), options);
   seconds["resampling"] = seconds_since(start);
   return light;
@@ -76,7 +76,7 @@ LightSource open_light_source(const std::string& command, const std::filesystem:
   start = Clock::now();
   const Resampling focused(session.views, session.rectangle, options, Team(), progress);
   seconds["focusing"] = seconds_since(start);
-  return Capture{std::move(session.views), focused.field(), focused.k()};
+  return Capture{std::move(session.views), focused.field(), focused.penalty()};
 }
 
 IncidentLight light_for(const LightSource& source, const TriangleMesh& mesh_in_world, const LightOptions& options,

@@ -18,7 +18,7 @@ namespace mf {
 struct Capture {
   std::vector<FieldView> views;
   LightField focused;  // no texels
-  int k = 0;           // views blended for a ray
+  PenaltyOptions penalty;
 };
 using LightSource = std::variant<LightField, Capture>;
 

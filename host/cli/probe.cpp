@@ -3,11 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
 #include "host/cli/command.h"
 #include "host/io/exr.h"
+#include "host/light_field/provenance.h"
 
 namespace mf {
 
@@ -20,8 +22,49 @@ struct ProbeArguments {
   std::vector<double> at;
   std::string consumer = "openexr";
   int width = 1024;
+  std::filesystem::path provenance;
+  std::vector<double> why;
   bool json = false;
 };
+
+// Which frames lit the ray, by the provenance that `resample` wrote beside the field.
+struct Why {
+  nlohmann::json json;
+  std::string text;
+};
+
+Why explain(const ProbeArguments& a, const LightField& field, const Eigen::Vector3d& at) {
+  if (a.provenance.empty())
+    throw InputError("probe", "--why", "needs --provenance FILE, which 'mirrorfield resample --provenance' writes");
+  const Eigen::Vector3d towards(a.why[0], a.why[1], a.why[2]);
+  if (!towards.allFinite() || towards.norm() <= 0)
+    throw InputError("probe", "--why", "needs three finite numbers, a direction in the world");
+  const Provenance provenance = read_provenance(a.provenance);
+  const std::size_t blocks = field.directions.size() * static_cast<std::size_t>(provenance.side * provenance.side);
+  if (provenance.emitter.size() != blocks)
+    throw InputError(a.provenance.string(), "", "belongs to another field: resample again with --provenance");
+  const FieldSampler sampler(field);
+  const auto ray = sampler.field_ray(at, towards.normalized());
+  if (!ray) throw InputError("probe", "--why", "looks along or below the plane: no light of the field comes from there");
+  const DirectionWeights near = sampler.locator().locate(ray->direction);
+  const auto nearest = static_cast<std::size_t>(std::max_element(near.weight.begin(), near.weight.end()) -
+                                                near.weight.begin());
+  const std::size_t direction = near.index[nearest];
+  const std::size_t block = provenance.block_at(field.plane, field.resolution, direction, ray->p_in_plane);
+  Why why{{{"direction", direction}, {"emitter", nullptr}, {"frames", nlohmann::json::array()}}, ""};
+  if (provenance.emitter[block] > 0) {
+    why.json["emitter"] = provenance.emitter[block] - 1;
+    why.text += fmt::format("near emitter {}: its outline and mask, which all views drew, come first\n",
+                            provenance.emitter[block] - 1);
+  }
+  for (const Provenance::Share& share : provenance.of_block(block)) {
+    if (share.weight <= 0) continue;
+    why.json["frames"].push_back({{"name", provenance.frames[share.frame]}, {"weight", share.weight}});
+    why.text += fmt::format("{:5.1f} %  {}\n", 100 * static_cast<double>(share.weight), provenance.frames[share.frame]);
+  }
+  if (why.json["frames"].empty()) why.text += "no frame saw it\n";
+  return why;
+}
 
 // Irradiance on an upward-facing plane, and the share of the upper hemisphere that some view saw.
 struct ProbeFigures {
@@ -58,6 +101,8 @@ void run(const ProbeArguments& a) {
   const Eigen::Vector3d at(a.at[0], a.at[1], a.at[2]);
   if (!at.allFinite()) throw InputError("probe", "--at", "needs three finite numbers, world metres");
   const LightField field = read_light_field(a.field);
+  Why why;
+  if (!a.why.empty()) why = explain(a, field, at);
   const Probe probe = make_probe(field, at, *convention, a.width);
   const ProbeFigures figures = measure(probe, *convention);
   ExrOptions options;
@@ -65,12 +110,14 @@ void run(const ProbeArguments& a) {
   options.attributes = {{"mfConsumer", a.consumer}, {"mfAt", fmt::format("{} {} {}", at.x(), at.y(), at.z())}};
   write_exr(a.output, probe.radiance, options);
   if (!a.confidence.empty()) write_exr(a.confidence, probe.confidence, options);
+  nlohmann::json summary{
+      {"irradiance", figures.irradiance}, {"seen_share", figures.seen_share}, {"width", a.width}, {"for", a.consumer}};
+  if (!a.why.empty()) summary["why"] = why.json;
   print_summary(
-      a.json,
-      {{"irradiance", figures.irradiance}, {"seen_share", figures.seen_share}, {"width", a.width}, {"for", a.consumer}},
-      fmt::format("irradiance on the ground {:.4g} {:.4g} {:.4g}, {:.0f} % of the upper hemisphere seen\n{}\n",
+      a.json, summary,
+      fmt::format("irradiance on the ground {:.4g} {:.4g} {:.4g}, {:.0f} % of the upper hemisphere seen\n{}{}\n",
                   figures.irradiance[0], figures.irradiance[1], figures.irradiance[2], 100 * figures.seen_share,
-                  a.output.string()));
+                  why.text, a.output.string()));
 }
 
 }  // namespace
@@ -84,6 +131,8 @@ void add_probe_command(CommandLine& program) {
   command.option("--width", a->width, "pixels across; the height is half of it");
   command.option("-o,--output", a->output, "lat-long EXR to write", Presence::required);
   command.option("--confidence", a->confidence, "also write the confidence (0…1) as an EXR");
+  command.values("--why", 3, a->why, "x y z of a direction (world): which frames lit the ray from there");
+  command.option("--provenance", a->provenance, "what 'resample --provenance' wrote, for --why");
   add_json_flag(command, a->json);
   command.on_run([a] { run(*a); });
 }

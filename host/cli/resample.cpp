@@ -21,8 +21,22 @@ struct ResampleArguments {
   ResampleOptions options;
   std::vector<double> rectangle;
   int threads = 0;
+  std::filesystem::path provenance;
+  bool no_fill = false;
   bool json = false;
 };
+
+nlohmann::json emitters_json(const std::vector<ShadedEmitter>& emitters) {
+  nlohmann::json all = nlohmann::json::array();
+  for (const ShadedEmitter& e : emitters) {
+    const Eigen::Vector3f& at = e.emitter.position;
+    all.push_back({{"at_m", {at.x(), at.y(), at.z()}},
+                   {"radius_m", e.emitter.radius_m},
+                   {"radiance", {e.radiance.x(), e.radiance.y(), e.radiance.z()}},
+                   {"views", e.emitter.views}});
+  }
+  return all;
+}
 
 nlohmann::json summarize(const ResampleResult& r) {
   nlohmann::json scores = nlohmann::json::array();
@@ -38,6 +52,8 @@ nlohmann::json summarize(const ResampleResult& r) {
           {"rectangle_m", {plane.min_m.x(), plane.min_m.y(), plane.max_m.x(), plane.max_m.y()}},
           {"height_m", plane.world_from_plane.translation.z()},
           {"mean_confidence", r.mean_confidence},
+          {"filled_share", r.filled_share},
+          {"emitters", emitters_json(r.field.emitters)},
           {"seconds", r.seconds},
           {"peak_memory_bytes", peak_memory_bytes()}};
 }
@@ -47,12 +63,15 @@ void run(ResampleArguments& a) {
     throw InputError("resample", "--threads", "must be a number of threads (0: as many as processors)");
   if (!a.rectangle.empty())
     a.options.rectangle = std::array<double, 4>{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
+  a.options.fill = !a.no_fill;
+  a.options.provenance = !a.provenance.empty();
   std::optional<tbb::global_control> limit;
   if (a.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(a.threads));
   Team team = Team::join();
   const ResampleResult r =
       run_resample(a.session, a.output, a.options, team, team.rank() == 0 ? progress_bar() : Progress());
   if (team.rank() > 0) return;
+  if (r.provenance) write_provenance(a.provenance, *r.provenance);
   const Eigen::Vector2d size = r.field.plane.size_m();
   print_summary(
       a.json, summarize(r),
@@ -71,6 +90,7 @@ ResampleResult run_resample(const std::filesystem::path& folder, const std::file
   const double loading = seconds_since(start);
   Resampling resampling(session.views, session.rectangle, options, team, progress);
   ResampleResult result = resample_to_file(resampling, output, session.absolute, team, progress);
+  if (options.provenance && team.rank() == 0) result.provenance = resampling.provenance(session.frame_names);
   result.seconds["loading"] = loading;
   result.seconds["total"] = seconds_since(start);
   return result;
@@ -87,8 +107,14 @@ void add_resample_command(CommandLine& program) {
   command.option("--size", a->options.size, "texels along each side of the plane's rectangle");
   command.option("--proxy", a->options.proxy,
                  "what the views are focused on: auto (a distance per direction), sphere (the best radius), sphere:R "
-                 "(metres), sphere:inf, plane");
+                 "(metres), sphere:inf, box (the best room), box:X0,Y0,X1,Y1,H (world metres), mesh:FILE (world "
+                 "coordinates), plane");
   command.option("-k", a->options.k, "views blended for a ray (0: 15 for the plane, 6 else)");
+  command.option("--resolution", a->options.resolution,
+                 "beta: metres of ray distance that an octave of missing resolution counts for");
+  command.option("--border", a->options.border, "gamma: how strongly views are shunned near the mirror's edge");
+  command.flag("--no-fill", a->no_fill, "leave what no view saw black instead of guessing it from around");
+  command.option("--provenance", a->provenance, "also write which frames lit which texels (EXR), for 'probe --why'");
   command.values("--rectangle", 4, a->rectangle,
                  "x0 y0 x1 y1 of the plane's rectangle, world metres (default: where the mirror swept)");
   command.option("--threads", a->threads, "threads of this process (0: as many as processors)");

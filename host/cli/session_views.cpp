@@ -25,7 +25,10 @@ SessionViews load_session_views(const std::string& command, const std::filesyste
   if (!rectangle)
     throw InputError((folder / "calibration.json").string(), "frames",
                      "no mirror view looks through the plane at this --height: lower it, or give --rectangle");
-  return {load_field_views(session, response, calibration, team, progress), *rectangle, response.absolute};
+  std::vector<std::string> names;
+  for (const MirrorPose& pose : calibration.frames) names.push_back(pose.name);
+  return {load_field_views(session, response, calibration, team, progress), *rectangle, response.absolute,
+          std::move(names)};
 }
 
 }  // namespace mf

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "common/progress.h"
@@ -15,6 +16,7 @@ struct SessionViews {
   std::vector<FieldView> views;
   PlaneRectangle rectangle;
   bool absolute = false;  // radiance is in the units of the reference reading
+  std::vector<std::string> frame_names;  // of the calibration, which FieldView::frame indexes
 };
 
 // Session folder (with response.json and calibration.json) → views. Throws InputError for a folder that is no such

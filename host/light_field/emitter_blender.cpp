@@ -88,12 +88,14 @@ EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surrou
                                std::vector<ShadedEmitter> emitters, Lit lit)
     : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)), lit_(lit) {}
 
-bool EmitterBlender::concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
-  return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
+std::uint32_t EmitterBlender::concerned(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
+                                        float angle_rad) const {
+  const auto found = std::find_if(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
     const Eigen::Vector3f to = s.emitter.position - p;
     const float reach = (s.emitter.radius_m + ghost_reach_m) / to.norm() + angle_rad;
     return to.dot(direction) > 0 && to.cross(direction).norm() < reach * to.norm();
   });
+  return found == emitters_.end() ? 0 : 1 + static_cast<std::uint32_t>(found - emitters_.begin());
 }
 
 const ShadedEmitter* EmitterBlender::met_by(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,

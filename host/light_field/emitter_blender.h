@@ -33,8 +33,12 @@ class EmitterBlender {
   enum class Lit { no, yes };
   EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>, Lit);
 
-  // Whether rays within `angle_rad` of the direction may see an emitter or a ghost of one.
-  [[nodiscard]] bool concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
+  // 1 + the index of an emitter that rays within `angle_rad` of the direction may see, or a ghost of it; 0: none.
+  [[nodiscard]] std::uint32_t concerned(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
+                                        float angle_rad) const;
+  [[nodiscard]] bool concerns(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
+    return concerned(p, direction, angle_rad) != 0;
+  }
 
   // Blended colour and weight of one ray with a footprint of `angle_rad`; only `candidates` are asked (indices of
   // views).

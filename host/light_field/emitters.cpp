@@ -9,6 +9,7 @@
 #include <optional>
 #include <random>
 
+#include "host/light_field/emitter_centre.h"
 #include "host/light_field/emitter_outline.h"
 
 namespace mf {
@@ -180,7 +181,8 @@ std::vector<Emitter> find_emitters(const std::vector<FieldView>& views, const Em
     const std::vector<const Spot*> all = voters(spots, position, options.tolerance_rad);
     if (static_cast<int>(all.size()) < options.fewest_views) break;
     position = nearest_point(all, position).value_or(position);
-    emitters.push_back(fit_outline(views, {position, typical_radius(all, position), static_cast<int>(all.size())}));
+    const Emitter seen{position, typical_radius(all, position), static_cast<int>(all.size())};
+    emitters.push_back(fit_outline(views, centred_on_rays(views, seen)));
     // What votes for this one, loosely, votes for no other.
     std::erase_if(spots, [&](const Spot& s) { return agrees(s, position, 3 * options.tolerance_rad + s.radius_rad); });
   }

@@ -11,6 +11,7 @@
 
 #include "common/check.h"
 #include "host/light_field/emitter_blender.h"
+#include "host/light_field/hole_filler.h"
 #include "host/light_field/plane_tiles.h"
 #include "host/light_field/tile_resampler.h"
 
@@ -105,13 +106,19 @@ struct EmitterVertices {
 class Worker {
  public:
   Worker(const std::vector<FieldView>& views, const LightField& focused, const EmitterBlender& dark,
-         const EmitterBlender& lit, int k, int most_texels)
-      : views_(views), focused_(focused), dark_(dark), lit_(lit), k_(k), most_texels_(most_texels) {
+         const EmitterBlender& lit, const HoleFiller& filler, const PenaltyOptions& penalty, int most_texels)
+      : views_(views),
+        focused_(focused),
+        dark_(dark),
+        lit_(lit),
+        filler_(filler),
+        penalty_(penalty),
+        most_texels_(most_texels) {
     all_views_.resize(views.size());
     std::iota(all_views_.begin(), all_views_.end(), 0U);
     part_.directions = focused.directions;
-    part_.surroundings.centre_in_world = focused.surroundings.centre_in_world;
-    part_.surroundings.inverse_distance = focused.surroundings.inverse_distance;
+    part_.surroundings = focused.surroundings;
+    part_.surroundings.panorama = {};
   }
 
   PlaneTile fill(const TileRequest& request) {
@@ -122,13 +129,14 @@ class Worker {
     PlaneTile emitted = vertices.tile(focused_);
     of_cell_ = smooth;
     part_.plane = {focused_.plane.world_from_plane, smooth.min_m.cast<double>(), smooth.max_m.cast<double>()};
-    TileResampler resampler(views_, part_, dark_, k_);
+    TileResampler resampler(views_, part_, dark_, penalty_);
     float solid_angle = 0;
     for (const std::uint32_t cell : request.cells) solid_angle += part_.directions.solid_angles_sr[cell];
     bool any_emitter = false;
     for (const std::uint32_t cell : request.cells) {
       const float share = part_.directions.solid_angles_sr[cell] / solid_angle;
       resampler.fill(cell, of_cell_.texels.data());
+      filler_.fill(cell, part_.plane, part_.resolution, of_cell_.texels.data());
       for (std::size_t t = 0; t < smooth.texels.size(); ++t) smooth.texels[t] += share * of_cell_.texels[t];
       any_emitter = add_emitters(cell, share, emitted) || any_emitter;
     }
@@ -164,7 +172,8 @@ class Worker {
   const EmitterBlender& dark_;
   const EmitterBlender& lit_;
   std::vector<std::uint32_t> all_views_;
-  int k_;
+  const HoleFiller& filler_;
+  PenaltyOptions penalty_;
   int most_texels_;
   LightField part_;
   PlaneTile of_cell_;              // what the cell at hand shows but for the emitters; w: confidence
@@ -222,6 +231,7 @@ std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const
   const int coarsest = whole_blocks(static_cast<float>(focused.plane.size_m().maxCoeff()) / coarsest_texel_m);
   part.resolution = std::min(focused.resolution, std::max(coarsest, most_texels));
   const RectifiedViews rectified(views, part.plane, part.resolution);
+  const HoleFiller filler(part);
   tbb::enumerable_thread_specific<PlaneTiles> resamplers([&] { return PlaneTiles(rectified, part, k); });
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(), [&](std::size_t i) {
@@ -232,6 +242,7 @@ std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const
     float solid_angle = 0;
     for (const std::uint32_t cell : requests[i].cells) {
       resamplers.local().fill(cell, of_cell.data());
+      filler.fill(cell, of_cell.data());
       solid_angle += part.directions.solid_angles_sr[cell];
       for (std::size_t t = 0; t < of_cell.size(); ++t)
         tile.texels[t] += part.directions.solid_angles_sr[cell] * of_cell[t];
@@ -243,15 +254,17 @@ std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const
 
 }  // namespace
 
-std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views, const LightField& focused, int k,
-                                             std::span<const TileRequest> requests, const JustInTimeOptions& options) {
+std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views, const LightField& focused,
+                                             const PenaltyOptions& penalty, std::span<const TileRequest> requests,
+                                             const JustInTimeOptions& options) {
   check(options.most_texels >= 8 && options.most_texels % 8 == 0, "a multiple of 8 texels");
-  if (focused.surroundings.is_plane()) return over_the_plane(views, focused, k, requests, options.most_texels);
+  if (focused.surroundings.is_plane()) return over_the_plane(views, focused, penalty.k, requests, options.most_texels);
   // Once without the emitters' light, where views that show their glare have no say, and once for that light alone.
   const EmitterBlender dark(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no);
   const EmitterBlender lit(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::yes);
+  const HoleFiller filler(focused);
   tbb::enumerable_thread_specific<Worker> workers(
-      [&] { return Worker(views, focused, dark, lit, k, options.most_texels); });
+      [&] { return Worker(views, focused, dark, lit, filler, penalty, options.most_texels); });
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(),
                     [&](std::size_t i) { tiles[i] = workers.local().fill(requests[i]); });

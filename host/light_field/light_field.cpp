@@ -14,18 +14,20 @@ Eigen::Vector4f sample_tile(const LightField& field, std::size_t direction, cons
   const int x1 = std::min(x0 + 1, field.resolution - 1), y1 = std::min(y0 + 1, field.resolution - 1);
   const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
   const Eigen::Vector4f* tile = field.tile(direction);
-  Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · confidence, confidence
+  Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · say, say
+  float confidence = 0;
   const auto add = [&](int tx, int ty, float weight) {
     const Eigen::Vector4f& texel = tile[ty * field.resolution + tx];
-    const float c = texel.w();  // a texel that no view saw does not darken its neighbours
-    sum += weight * c * Eigen::Vector4f(texel.x(), texel.y(), texel.z(), 1);
+    const float say = say_of(texel);  // a texel that no view saw does not darken its neighbours
+    sum += weight * say * Eigen::Vector4f(texel.x(), texel.y(), texel.z(), 1);
+    confidence += weight * texel.w();
   };
   add(x0, y0, (1 - fx) * (1 - fy));
   add(x1, y0, fx * (1 - fy));
   add(x0, y1, (1 - fx) * fy);
   add(x1, y1, fx * fy);
   if (sum.w() <= 0) return Eigen::Vector4f::Zero();
-  return {sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), sum.w()};
+  return {sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), confidence};
 }
 
 ImageF plane_irradiance(const LightField& field) {

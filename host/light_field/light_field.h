@@ -27,7 +27,8 @@ struct PlaneRectangle {
 //
 // For every direction a tile of resolution² texels over the rectangle; texel (0, 0) is at (min x, max y): a tile seen
 // in a viewer has +x right and +y up. `rgbc` holds half-float-exact values as float: red, green, blue, confidence; by
-// direction, then row, column. Confidence is 1 where views answered fully, 0 where no view looked (colour is then 0).
+// direction, then row, column. Confidence is 1 where views answered fully, 0 where no view looked: colour is then a guess
+// (see hole_filler.h), or 0 where none was made.
 // Each direction stands for its cell: its value is the mean radiance over that solid angle.
 struct LightField {
   PlaneRectangle plane;
@@ -48,8 +49,14 @@ struct LightField {
   [[nodiscard]] Eigen::Vector4f* tile(std::size_t direction) { return rgbc.data() + direction * texel_count(); }
 };
 
+// A texel's say when texels are mixed: its confidence. A guess speaks only where nothing else does.
+[[nodiscard]] inline float say_of(const Eigen::Vector4f& texel) {
+  constexpr float of_a_guess = 1e-4F;  // below any confidence that a half float of a view's weight can have left
+  return texel.w() > 0 ? texel.w() : (texel.head<3>().array() != 0).any() ? of_a_guess : 0.0F;
+}
+
 // Bilinear in p (plane coordinates, metres) within one direction's tile; p outside the rectangle is clamped to it.
-// Returns red, green, blue weighted by confidence, and the confidence.
+// Returns red, green, blue weighted by say_of(), and the confidence (0: a guess, or nothing).
 [[nodiscard]] Eigen::Vector4f sample_tile(const LightField&, std::size_t direction, const Eigen::Vector2f& p_in_plane);
 
 // Irradiance of the bare plane at each texel of a tile, three channels: E(p) = Σ L(p, ω) ω_z ΔΩ.

@@ -90,7 +90,10 @@ void read_maps(Imf::MultiPartInputFile& file, LightField& field, const std::stri
   for (int part = 1; part < file.parts(); ++part) {
     const std::string name = file.header(part).name();
     s.centre_in_world = centre_from(file.header(part), path);
-    if (name == "inverseDistance") s.inverse_distance = read_map(file, part, {"Y"});
+    if (name == "inverseDistance") {
+      s.inverse_distance = read_map(file, part, {"Y"});
+      shape_from(file.header(part), s);
+    }
     if (name == "distanceConfidence") s.confidence = read_map(file, part, {"Y"});
     if (name == "panorama") s.panorama = read_map(file, part, {"R", "G", "B", "A"});
     if (!name.starts_with("emitter")) continue;

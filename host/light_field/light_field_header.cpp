@@ -49,6 +49,15 @@ void describe(const ShadedEmitter& e, Imf::Header& header) {
   header.insert("mfMaskMax", Imf::V2fAttribute({e.mask_max_m.x(), e.mask_max_m.y()}));
 }
 
+// What the map of distances is a picture of, where that has a shape of its own.
+void describe_shape(const Surroundings& s, Imf::Header& header) {
+  if (s.box) {
+    header.insert("mfBoxMin", Imf::V2fAttribute({s.box->low.x(), s.box->low.y()}));
+    header.insert("mfBoxMax", Imf::V3fAttribute({s.box->high.x(), s.box->high.y(), s.box->ceiling}));
+  }
+  if (!s.mesh_file.empty()) header.insert("mfMesh", Imf::StringAttribute(s.mesh_file));
+}
+
 }  // namespace
 
 Imf::Header header_of(const LightField& field) {
@@ -102,6 +111,7 @@ Imf::Header header_of(const NamedMap& map, const Surroundings& s, const Imath::B
   for (const char* channel : map.channels) header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
   header.insert("mfCentre", Imf::V3fAttribute({s.centre_in_world.x(), s.centre_in_world.y(), s.centre_in_world.z()}));
   if (map.emitter != nullptr) describe(*map.emitter, header);
+  if (map.map == &s.inverse_distance) describe_shape(s, header);
   return header;
 }
 
@@ -163,6 +173,14 @@ LightField field_without_texels(const Imf::Header& header, const std::string& fi
 Eigen::Vector3f centre_from(const Imf::Header& header, const std::string& file) {
   const Imath::V3f& centre = attribute<Imf::V3fAttribute>(header, "mfCentre", file);
   return {centre.x, centre.y, centre.z};
+}
+
+void shape_from(const Imf::Header& header, Surroundings& s) {
+  const auto* low = header.findTypedAttribute<Imf::V2fAttribute>("mfBoxMin");
+  const auto* high = header.findTypedAttribute<Imf::V3fAttribute>("mfBoxMax");
+  if (low != nullptr && high != nullptr)
+    s.box = RoomBox{{low->value().x, low->value().y}, {high->value().x, high->value().y}, high->value().z};
+  if (const auto* mesh = header.findTypedAttribute<Imf::StringAttribute>("mfMesh")) s.mesh_file = mesh->value();
 }
 
 ShadedEmitter emitter_from(const Imf::Header& header, const std::string& path) {

@@ -32,13 +32,15 @@ std::optional<FieldRay> FieldSampler::field_ray(const Eigen::Vector3d& x_in_worl
 
 Eigen::Vector4f FieldSampler::radiance(const FieldRay& ray) const {
   const DirectionWeights near = locator_.locate(ray.direction);
-  Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · confidence, confidence
+  Eigen::Vector4f sum = Eigen::Vector4f::Zero();  // colour · say, say
+  float confidence = 0;
   for (std::size_t i = 0; i < near.index.size(); ++i) {
     const Eigen::Vector4f seen = sample_tile(field_, near.index[i], ray.p_in_plane);
-    sum += near.weight[i] * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+    sum += near.weight[i] * say_of(seen) * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
+    confidence += near.weight[i] * seen.w();
   }
   if (sum.w() <= 0) return Eigen::Vector4f::Zero();
-  return {sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), sum.w()};
+  return {sum.x() / sum.w(), sum.y() / sum.w(), sum.z() / sum.w(), confidence};
 }
 
 Eigen::Vector3f FieldSampler::seen_from_centre(const FieldRay& ray) const {

@@ -6,15 +6,18 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "common/check.h"
+#include "host/light_field/hole_filler.h"
 #include "host/light_field/light_field_writer.h"
 #include "host/light_field/panorama.h"
 #include "host/light_field/plane_tiles.h"
+#include "host/light_field/proxy_choice.h"
 #include "host/light_field/tile_resampler.h"
 
 namespace mf {
@@ -28,25 +31,15 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-Surroundings choose_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                                 const std::string& proxy, int k, std::span<const Emitter> emitters, const Team& team,
-                                 std::vector<SphereScore>& scores) {
-  if (proxy == "plane") return {};
-  if (proxy == "auto") return find_surroundings(views, rectangle, emitters, team);
-  if (const auto radius = parse_sphere(proxy)) return sphere_surroundings(centre_of(rectangle), *radius);
-  scores = score_spheres(views, rectangle, k);
-  const auto best = std::min_element(scores.begin(), scores.end(), [](const SphereScore& a, const SphereScore& b) {
-    return a.inconsistency < b.inconsistency;
-  });
-  return sphere_surroundings(centre_of(rectangle), best->radius_m);
-}
-
 std::string options_to_json(const ResampleOptions& o, int k, const Surroundings& surroundings) {
   nlohmann::json json{{"height", o.height_m},
                       {"directions", o.directions},
                       {"size", o.size},
                       {"proxy", surroundings_name(surroundings)},
-                      {"k", k}};
+                      {"k", k},
+                      {"resolution", o.resolution},
+                      {"border", o.border},
+                      {"fill", o.fill}};
   if (o.rectangle) json["rectangle"] = *o.rectangle;
   return json.dump();
 }
@@ -58,8 +51,11 @@ std::optional<std::string> ResampleOptions::validate() const {
   if (directions < 11 || directions > 500000) return "directions: must be between 11 and 500000";
   if (size < 2 || size > 1024) return "size: must be between 2 and 1024 texels";
   if (k < 0 || k > 64) return "k: must be between 1 and 64 views (0 chooses)";
-  if (proxy != "auto" && proxy != "sphere" && proxy != "plane" && !parse_sphere(proxy))
-    return "proxy: must be auto, sphere, sphere:R (metres), sphere:inf or plane";
+  if (!(resolution >= 0) || !std::isfinite(resolution)) return "resolution: must be a number ≥ 0";
+  if (!(border > 0) || !std::isfinite(border)) return "border: must be a number > 0";
+  if (proxy == "plane" && resolution != 0) return "resolution: is for the other proxies; leave it out with plane";
+  if (proxy == "plane" && border != 1) return "border: is for the other proxies; leave it out with plane";
+  if (const auto fault = proxy_fault(proxy)) return "proxy: " + *fault;
   if (rectangle && !((*rectangle)[2] > (*rectangle)[0] && (*rectangle)[3] > (*rectangle)[1]))
     return "rectangle: must be x0 y0 x1 y1 with x0 < x1 and y0 < y1, in metres";
   return std::nullopt;
@@ -69,7 +65,7 @@ std::optional<std::string> ResampleOptions::validate() const {
 
 struct Resampling::Impl {
   const std::vector<FieldView>& views;
-  int k = 0;
+  PenaltyOptions penalty;
   LightField field;
   std::vector<SphereScore> sphere_scores;
   double focusing_s = 0;
@@ -78,11 +74,12 @@ struct Resampling::Impl {
   std::optional<EmitterBlender> emitters;
   std::optional<tbb::enumerable_thread_specific<PlaneTiles>> plane_tiles;
   std::optional<tbb::enumerable_thread_specific<TileResampler>> resamplers;
+  std::optional<HoleFiller> filler;
 };
 
 Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
                        const ResampleOptions& options, const Team& team, const Progress& progress)
-    : impl_(new Impl{views, 0, {}, {}, 0, {}, {}, {}, {}}) {
+    : impl_(new Impl{views, {}, {}, {}, 0, {}, {}, {}, {}, {}}) {
   check(!options.validate().has_value(), "resample options are validated by the caller");
   const auto start = Clock::now();
   report_progress(progress, "focusing", 0);
@@ -92,9 +89,11 @@ Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle
   field.resolution = options.size;
   field.directions = geodesic_hemisphere(options.directions);
   const int k = options.k > 0 ? options.k : options.proxy == "plane" ? 15 : 6;
-  i.k = k;
+  i.penalty = {k, 1, static_cast<float>(options.resolution), static_cast<float>(options.border)};
   const std::vector<Emitter> emitters = options.proxy == "plane" ? std::vector<Emitter>{} : find_emitters(views);
-  field.surroundings = choose_surroundings(views, rectangle, options.proxy, k, emitters, team, i.sphere_scores);
+  ProxyChoice choice = choose_proxy(views, rectangle, options.proxy, k, emitters, team);
+  field.surroundings = std::move(choice.surroundings);
+  i.sphere_scores = std::move(choice.sphere_scores);
   field.options_json = options_to_json(options, k, field.surroundings);
   if (field.surroundings.is_plane()) {
     i.rectified.emplace(views, rectangle, options.size);
@@ -103,8 +102,9 @@ Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle
     i.emitters.emplace(views, field.surroundings, emitters, rectangle, team);
     field.emitters = i.emitters->emitters();
     field.surroundings.panorama = make_panorama(views, field.surroundings, *i.emitters, panorama_width, team);
-    i.resamplers.emplace([&i, k] { return TileResampler(i.views, i.field, *i.emitters, k); });
+    i.resamplers.emplace([&i] { return TileResampler(i.views, i.field, *i.emitters, i.penalty); });
   }
+  if (options.fill) i.filler.emplace(field);
   report_progress(progress, "focusing", 1);
   i.focusing_s = seconds_since(start);
 }
@@ -114,8 +114,8 @@ Resampling::~Resampling() = default;
 const LightField& Resampling::field() const {
   return impl_->field;
 }
-int Resampling::k() const {
-  return impl_->k;
+const PenaltyOptions& Resampling::penalty() const {
+  return impl_->penalty;
 }
 const std::vector<SphereScore>& Resampling::sphere_scores() const {
   return impl_->sphere_scores;
@@ -127,11 +127,19 @@ double Resampling::focusing_s() const {
   return impl_->focusing_s;
 }
 
-void Resampling::fill(std::size_t direction, Eigen::Vector4f* tile) {
+std::size_t Resampling::fill(std::size_t direction, Eigen::Vector4f* tile) {
   if (impl_->plane_tiles)
     impl_->plane_tiles->local().fill(direction, tile);
   else
     impl_->resamplers->local().fill(direction, tile);
+  return impl_->filler ? impl_->filler->fill(direction, tile) : 0;
+}
+
+Provenance Resampling::provenance(std::vector<std::string> frame_names) const {
+  // The plane goes without emitters.
+  const EmitterBlender none(impl_->views, impl_->field.surroundings, std::vector<ShadedEmitter>{});
+  return trace_provenance(impl_->views, impl_->field, impl_->emitters ? *impl_->emitters : none, impl_->penalty,
+                          std::move(frame_names));
 }
 
 // ---- all of them ----
@@ -143,6 +151,7 @@ struct FinishedTile {
   std::size_t direction = 0;
   std::string packed;
   double mean_confidence = 0;
+  std::size_t filled = 0;
   double blending_s = 0;
   double packing_s = 0;
 };
@@ -174,7 +183,7 @@ void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, cons
     FinishedTile finished;
     finished.direction = direction;
     auto start = Clock::now();
-    resampling.fill(direction, tile.data());
+    finished.filled = resampling.fill(direction, tile.data());
     finished.blending_s = seconds_since(start);
     finished.mean_confidence = mean_confidence_of(tile);
     start = Clock::now();
@@ -193,17 +202,21 @@ void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, cons
 // What is summed up over the tiles, in their order.
 struct Tally {
   double confidence = 0, weights = 0, blending_s = 0, packing_s = 0;
+  std::size_t filled = 0;
 
   void add(const DirectionSet& set, const FinishedTile& tile) {
     const double w = static_cast<double>(set.solid_angles_sr[tile.direction] * set.directions[tile.direction].z());
     confidence += w * tile.mean_confidence;
     weights += w;
+    filled += tile.filled;
     blending_s += tile.blending_s;
     packing_s += tile.packing_s;
   }
   void enter(ResampleResult& result) const {
     const double threads = tbb::this_task_arena::max_concurrency();
     result.mean_confidence = confidence / weights;
+    result.filled_share = static_cast<double>(filled) / static_cast<double>(result.field.directions.size() *
+                                                                            result.field.texel_count());
     result.seconds["blending"] = blending_s / threads;
     result.seconds["packing"] = packing_s / threads;
   }
@@ -218,17 +231,19 @@ ResampleResult start_of_result(const Resampling& resampling) {
   return result;
 }
 
-// A tile as one rank sends it to another: its mean confidence, then the packed bytes.
+// A tile as one rank sends it to another: its mean confidence, how many texels are guesses, then the packed bytes.
 std::string to_message(const FinishedTile& tile) {
-  std::string message(sizeof tile.mean_confidence, '\0');
+  std::string message(sizeof tile.mean_confidence + sizeof tile.filled, '\0');
   std::memcpy(message.data(), &tile.mean_confidence, sizeof tile.mean_confidence);
+  std::memcpy(message.data() + sizeof tile.mean_confidence, &tile.filled, sizeof tile.filled);
   return message + tile.packed;
 }
 FinishedTile from_message(std::size_t direction, const std::string& message) {
   FinishedTile tile;
   tile.direction = direction;
   std::memcpy(&tile.mean_confidence, message.data(), sizeof tile.mean_confidence);
-  tile.packed = message.substr(sizeof tile.mean_confidence);
+  std::memcpy(&tile.filled, message.data() + sizeof tile.mean_confidence, sizeof tile.filled);
+  tile.packed = message.substr(sizeof tile.mean_confidence + sizeof tile.filled);
   return tile;
 }
 
@@ -251,6 +266,7 @@ ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangl
                     static_cast<double>(tile.direction + 1) / static_cast<double>(field.directions.size()));
   });
   tally.enter(result);
+  if (options.provenance) result.provenance = resampling.provenance({});
   return result;
 }
 

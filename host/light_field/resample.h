@@ -12,6 +12,7 @@
 #include "common/progress.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/provenance.h"
 #include "host/light_field/surroundings_search.h"
 #include "host/team/team.h"
 
@@ -22,9 +23,16 @@ struct ResampleOptions {
   int directions = 2500;  // about how many, over the hemisphere; ≥ 11
   int size = 128;         // texels along each side of the rectangle; 2 to 1024
   // What the views are focused on. auto: a distance per direction by photo-consistency; sphere: one sphere whose radius
-  // photo-consistency chooses; sphere:R (metres); sphere:inf; plane: the light-field plane itself (the paper's).
+  // photo-consistency chooses; sphere:R (metres); sphere:inf; box: a room whose sides it chooses; box:X0,Y0,X1,Y1,H
+  // (world metres); mesh:FILE (world coordinates); plane: the light-field plane itself (the paper's).
   std::string proxy = "auto";
   int k = 0;  // views blended for a ray; 0: 15 for the plane (the paper's), 6 else; 1 to 64
+  // Buehler's penalty (host/blending/ray_penalty.h): β in metres of ray distance per octave of missing resolution, ≥ 0;
+  // γ > 0, how strongly views are shunned near their border. α, the unit of both, is 1. The plane has no choice of them.
+  double resolution = 0;
+  double border = 1;
+  bool fill = true;         // give texels that no view saw a guess, at confidence 0; else they stay black
+  bool provenance = false;  // also tell which frames lit which texels
   std::optional<std::array<double, 4>> rectangle;  // x0 y0 x1 y1 in world metres; else from the mirror's openings
 
   // What is wrong, in words that name the field; nothing when all is well.
@@ -37,6 +45,8 @@ struct ResampleResult {
   std::map<std::string, double> seconds;   // by stage; blending and packing: of all threads, over their number
   std::size_t views = 0;
   double mean_confidence = 0;  // cosine-weighted over directions, mean over the plane
+  double filled_share = 0;     // of the texels: those that no view saw, if they were given a guess
+  std::optional<Provenance> provenance;  // when asked for
 };
 
 // A capture that is focused and ready to be resampled (Ihrke et al. 2008, §4.3), each ray blended from the k best views
@@ -53,9 +63,12 @@ class Resampling {
 
   // Everything but the texels.
   [[nodiscard]] const LightField& field() const;
-  [[nodiscard]] int k() const;  // views blended for a ray
-  // One direction's tile, resolution² texels. In any thread, in any order: the result is the same.
-  void fill(std::size_t direction, Eigen::Vector4f* tile);
+  [[nodiscard]] const PenaltyOptions& penalty() const;  // how views are chosen for a ray
+  // One direction's tile, resolution² texels. In any thread, in any order: the result is the same. Returns how many of
+  // them no view saw and were given a guess.
+  std::size_t fill(std::size_t direction, Eigen::Vector4f* tile);
+  // Which frames light which texels, by the names of the calibration's frames.
+  [[nodiscard]] Provenance provenance(std::vector<std::string> frame_names) const;
 
   [[nodiscard]] const std::vector<SphereScore>& sphere_scores() const;
   [[nodiscard]] std::size_t views() const;

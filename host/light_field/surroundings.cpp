@@ -9,6 +9,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/tracing/ray_scene.h"
+
 namespace mf {
 
 namespace {
@@ -21,6 +23,13 @@ float inverse_to_sphere(const Eigen::Vector3f& from_centre, const Eigen::Vector3
   const float along = -b + std::sqrt(std::max(b * b - from_centre.squaredNorm() + r * r, 0.0F));
   constexpr float nearest_m = 0.02F;
   return 1 / std::max(along, nearest_m);
+}
+
+// Distance along a ray from p to a mesh's first triangle, inverted.
+float inverse_to_mesh(const RayScene& mesh, const Eigen::Vector3f& p, const Eigen::Vector3f& direction) {
+  constexpr float nearest_m = 0.02F;  // a table in the mesh, on which the plane lies, hides nothing
+  const auto hit = mesh.intersect(p + nearest_m * direction, direction);
+  return hit ? 1 / (hit->distance + nearest_m) : 0;
 }
 
 float bilinear(const ImageF& map, const Eigen::Vector2f& position) {
@@ -53,11 +62,15 @@ Eigen::Vector3f equal_area_direction(const Eigen::Vector2f& position) {
 }
 
 float Surroundings::inverse_distance_of(const Eigen::Vector3f& direction) const {
+  if (box) return box->inverse_distance_along(centre_in_world, direction);
+  if (mesh) return inverse_to_mesh(*mesh, centre_in_world, direction);
   if (inverse_distance.data.size() == 1) return inverse_distance.data[0];
   return bilinear(inverse_distance, equal_area_square(direction));
 }
 
 float Surroundings::inverse_distance_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
+  if (box) return box->inverse_distance_along(p, direction);
+  if (mesh) return inverse_to_mesh(*mesh, p, direction);
   const Eigen::Vector3f from_centre = p - centre_in_world;
   if (inverse_distance.data.size() == 1) return inverse_to_sphere(from_centre, direction, inverse_distance.data[0]);
   constexpr float nearest_m = 0.2F;
@@ -106,8 +119,43 @@ Surroundings sphere_surroundings(const Eigen::Vector3f& centre_in_world, double 
   return s;
 }
 
+namespace {
+
+// Fills the map with what the centre sees of the shape.
+void draw_map(Surroundings& s, int side) {
+  s.inverse_distance = ImageF(side, side, 1);
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x)
+      s.inverse_distance.at(x, y) = s.inverse_distance_of(equal_area_direction(
+          Eigen::Vector2f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F) / static_cast<float>(side)));
+}
+
+}  // namespace
+
+Surroundings box_surroundings(const Eigen::Vector3f& centre_in_world, const RoomBox& box) {
+  Surroundings s;
+  s.centre_in_world = centre_in_world;
+  s.box = box;
+  constexpr int map_side = 256;
+  draw_map(s, map_side);
+  return s;
+}
+
+Surroundings mesh_surroundings(const Eigen::Vector3f& centre_in_world, std::shared_ptr<const RayScene> mesh,
+                               std::string mesh_file) {
+  Surroundings s;
+  s.centre_in_world = centre_in_world;
+  s.mesh = std::move(mesh);
+  s.mesh_file = std::move(mesh_file);
+  constexpr int map_side = 512;
+  draw_map(s, map_side);
+  return s;
+}
+
 std::string surroundings_name(const Surroundings& s) {
   if (s.is_plane()) return "plane";
+  if (s.box) return box_name(*s.box);
+  if (!s.mesh_file.empty()) return "mesh:" + s.mesh_file;
   if (s.inverse_distance.data.size() > 1) return "depth";
   const float inverse = s.inverse_distance.data[0];
   return inverse > 0 ? fmt::format("sphere:{:.3g}", 1 / inverse) : "sphere:inf";

@@ -2,23 +2,31 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/image.h"
+#include "host/light_field/room_box.h"
 
 namespace mf {
+
+class RayScene;
 
 // What the light comes from: the proxy on which captured views are focused (docs/light_field.md, "Focus").
 //
 // A star-shaped surface about `centre`: for each direction of the upper hemisphere the inverse distance to what is seen
 // there, 1/metres (0: so far that no view sees parallax), on an equal-area map. A single value is a sphere. An empty
-// map stands for the paper's proxy, the light-field plane itself.
+// map stands for the paper's proxy, the light-field plane itself. Of a room or a mesh the map is a picture, for those who
+// read the file; rays meet the shape itself.
 struct Surroundings {
   Eigen::Vector3f centre_in_world = Eigen::Vector3f::Zero();
   ImageF inverse_distance;  // one channel; Lambert's equal-area map (equal_area_square)
+  std::optional<RoomBox> box;
+  std::shared_ptr<const RayScene> mesh;  // shared: copies of a field look at the same triangles. Not in the file
+  std::string mesh_file;                 // its name, without folders; in the file
   ImageF confidence;        // same size, 0…1: how clearly the distance was found; empty for a given sphere
 
   // Colour of the surroundings as seen from the centre, finer than the field's directions can hold: RGB + weight, the
@@ -29,8 +37,8 @@ struct Surroundings {
   [[nodiscard]] bool is_plane() const { return inverse_distance.empty(); }
 
   // 1 / distance from p to where the ray from p towards `direction` (world, unit) meets the surface; 0 when distant.
-  // The nearest crossing beyond 0.2 m counts. Precondition: not the plane; p is nearer to the centre than the surface
-  // is.
+  // The nearest crossing beyond 0.2 m counts (of a mesh: beyond 2 cm, either side of a triangle; a ray that meets none is
+  // distant). Precondition: not the plane; p is nearer to the centre than the surface is.
   [[nodiscard]] float inverse_distance_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
 
   // Inverse distance from the centre; bilinear. A direction below the horizon takes the horizon's value.
@@ -43,7 +51,15 @@ struct Surroundings {
 // A sphere; infinity is allowed.
 [[nodiscard]] Surroundings sphere_surroundings(const Eigen::Vector3f& centre_in_world, double radius_m);
 
-// "plane", "sphere:1.4", "sphere:inf", or "depth" for a map.
+// A room. The map has 256² cells, half a degree each.
+[[nodiscard]] Surroundings box_surroundings(const Eigen::Vector3f& centre_in_world, const RoomBox&);
+
+// Triangles in world coordinates. The map has 512² cells, a quarter of a degree each; a file's reader so sees what the
+// centre sees. `mesh_file` only names them.
+[[nodiscard]] Surroundings mesh_surroundings(const Eigen::Vector3f& centre_in_world, std::shared_ptr<const RayScene>,
+                                             std::string mesh_file);
+
+// "plane", "sphere:1.4", "sphere:inf", "box:-2,-1.5,3,1.5,2.4", "mesh:room.obj", or "depth" for a map.
 [[nodiscard]] std::string surroundings_name(const Surroundings&);
 
 // The radius in "sphere:2.5" or "sphere:inf". Nothing for anything else or a radius that is not positive.

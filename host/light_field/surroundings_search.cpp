@@ -10,41 +10,10 @@
 #include <numbers>
 
 #include "host/blending/view_weights.h"
+#include "host/light_field/distance_sweep.h"
 #include "host/light_field/view_rays.h"
 
 namespace mf {
-
-namespace {
-
-constexpr float voting_weight = 0.5F;      // views nearer to their border than this do not vote
-constexpr float darkest_radiance = 1e-4F;  // below, the logarithm only magnifies noise
-
-// log2 luminance of what a view shows of the proxy point, over about `angle_rad`; nothing when it does not see it.
-std::optional<float> log_luminance(const FieldView& view, const ProxyPoint& x, float angle_rad) {
-  const Eigen::Vector3f pixel = pixel_of(view, x);
-  if (pixel.z() <= 0) return std::nullopt;
-  const Eigen::Vector4f seen =
-      view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-  if (seen.w() < voting_weight) return std::nullopt;
-  return std::log2(std::max(shown_luminance(seen), darkest_radiance));
-}
-
-// Mean distance from the median, each at most `limit`: what a view behind an occluder says counts once, not fully.
-double robust_spread(std::vector<float>& values, float limit) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  const float median = *middle;
-  double sum = 0;
-  for (const float v : values) sum += static_cast<double>(std::min(std::abs(v - median), limit));
-  return sum / static_cast<double>(values.size());
-}
-
-}  // namespace
-
-Eigen::Vector3f centre_of(const PlaneRectangle& rectangle) {
-  const Eigen::Vector2d middle = 0.5 * (rectangle.min_m + rectangle.max_m);
-  return (rectangle.world_from_plane * Eigen::Vector3d(middle.x(), middle.y(), 0)).cast<float>();
-}
 
 // ---- one sphere ----
 
@@ -129,80 +98,18 @@ std::vector<SphereScore> score_spheres(const std::vector<FieldView>& views, cons
 
 namespace {
 
-constexpr int map_size = 96;           // cells along the equal-area square: about 1.5° each
-constexpr int level_count = 28;        // inverse distances, evenly from 0
-constexpr float nearest_share = 0.8F;  // of the rectangle's half diagonal: nothing nearer is looked for
-constexpr float sweep_angle_rad = 0.015F;
-constexpr float occluded_stops = 1.0F;  // a vote further off than this counts as this
-constexpr std::size_t fewest_votes = 4;
-constexpr float doubt_votes = 8;               // a cost counts as if so many further votes had said doubt_stops:
-constexpr float doubt_stops = 0.6F;            // few views that happen to agree are no evidence
-constexpr float far_preference_stops = 0.05F;  // by which the nearest level must be better than the farthest
 constexpr float emitter_margin_m = 0.1F;  // by about so much the views blended for a ray pass it by: so far off the
                                           // emitter still shows in one of them, and must show in its place
-constexpr float smoothing_cells = 1.3F;   // σ over directions
-
-using CostVolume = std::vector<ImageF>;  // one picture a level; infinite where too few views vote
-
-float cost_of(std::vector<float>& votes, int level) {
-  const float n = static_cast<float>(votes.size()), spread = static_cast<float>(robust_spread(votes, occluded_stops));
-  return (n * spread + doubt_votes * doubt_stops) / (n + doubt_votes) +
-         far_preference_stops * static_cast<float>(level) / (level_count - 1);
-}
-
-CostVolume sweep(const std::vector<FieldView>& views, const Eigen::Vector3f& centre, float level_step,
-                 const Team& team) {
-  CostVolume cost(static_cast<std::size_t>(level_count),
-                  ImageF(map_size, map_size, 1, std::numeric_limits<float>::infinity()));
-  tbb::parallel_for(0, map_size, [&](int y) {
-    if (!team.has(static_cast<std::size_t>(y))) return;
-    std::vector<float> votes;
-    for (int x = 0; x < map_size; ++x) {
-      const Eigen::Vector3f d =
-          equal_area_direction(Eigen::Vector2f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F) / map_size);
-      for (int level = 0; level < level_count; ++level) {
-        const ProxyPoint point = proxy_point(centre, d, static_cast<float>(level) * level_step);
-        votes.clear();
-        for (const FieldView& view : views)
-          if (const auto value = log_luminance(view, point, sweep_angle_rad)) votes.push_back(*value);
-        if (votes.size() >= fewest_votes) cost[static_cast<std::size_t>(level)].at(x, y) = cost_of(votes, level);
-      }
-    }
-  });
-  for (ImageF& level : cost) share_rows(team, level);
-  return cost;
-}
-
-// Gaussian over directions; cells without a cost are left out, and filled from their neighbours.
-ImageF smoothed(const ImageF& cost) {
-  const int reach = static_cast<int>(std::ceil(3 * smoothing_cells));
-  ImageF out(cost.width, cost.height, 1, std::numeric_limits<float>::infinity());
-  for (int y = 0; y < cost.height; ++y)
-    for (int x = 0; x < cost.width; ++x) {
-      float sum = 0, weights = 0;
-      for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx) {
-          const int tx = x + dx, ty = y + dy;
-          if (tx < 0 || ty < 0 || tx >= cost.width || ty >= cost.height || !std::isfinite(cost.at(tx, ty))) continue;
-          const float w = std::exp(-0.5F * static_cast<float>(dx * dx + dy * dy) / (smoothing_cells * smoothing_cells));
-          sum += w * cost.at(tx, ty);
-          weights += w;
-        }
-      if (weights > 0) out.at(x, y) = sum / weights;
-    }
-  return out;
-}
-
 // The level of least cost, between levels by a parabola; and how far the mean cost lies above it, relative.
 struct BestLevel {
   float level = 0;
   float confidence = 0;
 };
-BestLevel best_level(const CostVolume& cost, int x, int y) {
-  const auto at = [&](int level) { return cost[static_cast<std::size_t>(level)].at(x, y); };
+BestLevel best_level(const DistanceSweep& sweep, int x, int y) {
+  const auto at = [&](int level) { return sweep.cost[static_cast<std::size_t>(level)].at(x, y); };
   int best = 0, counted = 0;
   float mean = 0;
-  for (int level = 0; level < level_count; ++level) {
+  for (int level = 0; level < sweep.levels(); ++level) {
     if (!std::isfinite(at(level))) continue;
     mean += at(level);
     ++counted;
@@ -211,7 +118,7 @@ BestLevel best_level(const CostVolume& cost, int x, int y) {
   if (counted == 0) return {};
   mean /= static_cast<float>(counted);
   BestLevel out{static_cast<float>(best), mean > 0 ? std::clamp(1 - at(best) / mean, 0.0F, 1.0F) : 0};
-  if (best > 0 && best + 1 < level_count && std::isfinite(at(best - 1)) && std::isfinite(at(best + 1))) {
+  if (best > 0 && best + 1 < sweep.levels() && std::isfinite(at(best - 1)) && std::isfinite(at(best + 1))) {
     const float curvature = at(best - 1) - 2 * at(best) + at(best + 1);
     if (curvature > 0) out.level += std::clamp(0.5F * (at(best - 1) - at(best + 1)) / curvature, -0.5F, 0.5F);
   }
@@ -236,10 +143,11 @@ ImageF median_of_nine(const ImageF& in) {
 void set_distance(Surroundings& s, const Emitter& emitter) {
   const Eigen::Vector3f to = emitter.position - s.centre_in_world;
   const float distance = to.norm(), reach = (emitter.radius_m + emitter_margin_m) / distance;
-  for (int y = 0; y < map_size; ++y)
-    for (int x = 0; x < map_size; ++x) {
-      const Eigen::Vector3f d =
-          equal_area_direction(Eigen::Vector2f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F) / map_size);
+  const int side = s.inverse_distance.width;
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x) {
+      const Eigen::Vector3f d = equal_area_direction(
+          Eigen::Vector2f(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F) / static_cast<float>(side));
       if (d.cross(to / distance).norm() > reach || d.dot(to) < 0) continue;
       s.inverse_distance.at(x, y) = 1 / distance;
       s.confidence.at(x, y) = 1;
@@ -248,20 +156,15 @@ void set_distance(Surroundings& s, const Emitter& emitter) {
 
 }  // namespace
 
-Surroundings find_surroundings(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
-                               std::span<const Emitter> emitters, const Team& team) {
-  const float nearest_m = nearest_share * 0.5F * static_cast<float>(rectangle.size_m().norm());
-  const float level_step = 1 / nearest_m / static_cast<float>(level_count - 1);
+Surroundings find_surroundings(const DistanceSweep& sweep, std::span<const Emitter> emitters) {
   Surroundings s;
-  s.centre_in_world = centre_of(rectangle);
-  CostVolume cost = sweep(views, s.centre_in_world, level_step, team);
-  tbb::parallel_for(std::size_t{0}, cost.size(), [&](std::size_t level) { cost[level] = smoothed(cost[level]); });
-  s.inverse_distance = ImageF(map_size, map_size, 1);
-  s.confidence = ImageF(map_size, map_size, 1);
-  for (int y = 0; y < map_size; ++y)
-    for (int x = 0; x < map_size; ++x) {
-      const BestLevel best = best_level(cost, x, y);
-      s.inverse_distance.at(x, y) = best.level * level_step;
+  s.centre_in_world = sweep.centre_in_world;
+  s.inverse_distance = ImageF(sweep.side(), sweep.side(), 1);
+  s.confidence = ImageF(sweep.side(), sweep.side(), 1);
+  for (int y = 0; y < sweep.side(); ++y)
+    for (int x = 0; x < sweep.side(); ++x) {
+      const BestLevel best = best_level(sweep, x, y);
+      s.inverse_distance.at(x, y) = best.level * sweep.level_step;
       s.confidence.at(x, y) = best.confidence;
     }
   s.inverse_distance = median_of_nine(s.inverse_distance);

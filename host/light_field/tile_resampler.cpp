@@ -25,12 +25,12 @@ constexpr float outline_margin = 0.3F;                // of the outline's size, 
 }  // namespace
 
 TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field,
-                             const EmitterBlender& emitters, int k)
+                             const EmitterBlender& emitters, const PenaltyOptions& penalty)
     : views_(views),
       field_(field),
       emitters_(emitters),
       grid_(field.plane, field.resolution),
-      k_(k),
+      penalty_(penalty),
       blocks_((field.resolution + block_side - 1) / block_side),
       vertices_(blocks_ * block_vertices + 1),
       vertex_(static_cast<std::size_t>(vertices_ * vertices_)),
@@ -123,7 +123,9 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     if (pixel.z() <= 0) return INFINITY;
     const float weight =
         view.fetch(level_for_angle(view, v.focus, cell_.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
-    return weight >= smallest_view_weight ? bounds_[i] / (weight * weight) : INFINITY;
+    if (weight < smallest_view_weight) return INFINITY;
+    const float penalty = penalty_of(penalty_, {std::sqrt(bounds_[i]), coarseness_of(view, v.focus), weight});
+    return penalty * penalty;
   };
   const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
   const std::size_t corner = static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x);
@@ -131,7 +133,7 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
   best.clear();
   float farthest = 0;
   for (const ViewPenalty& found :
-       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(k_) + spare, squared_penalty)) {
+       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(penalty_.k) + spare, squared_penalty)) {
     best.push_back(found.view);
     farthest = std::max(farthest, bounds_[found.view]);
   }
@@ -185,6 +187,25 @@ Eigen::Vector4f TileResampler::fetch_cell(const FieldView& view, const Vertex& v
   return image.decoded(sum) / solid_angle;
 }
 
+float TileResampler::coarseness_of(const FieldView& view, const ProxyPoint& x) const {
+  if (penalty_.resolution == 0) return 0;
+  const float pixels = cell_.part_angle_rad / ray_to(x, view.centre_in_world).norm() * view.focal_px;
+  return coarseness(pixels * pixels, 1);
+}
+
+// penalty_of() at every texel. With the usual options it is the distance over the weight.
+void TileResampler::penalize(const FieldView& view, const Lanes3& p, const Lanes4& focus, const Lanes& weight,
+                             Lanes& penalty) const {
+  distance_penalties(p, focus, view.centre_in_world, weight, penalty);
+  if (penalty_.angle == 1 && penalty_.resolution == 0 && penalty_.border == 1) return;
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    if (weight.v[i] < smallest_view_weight) continue;
+    const ProxyPoint x(focus.x.v[i], focus.y.v[i], focus.z.v[i], focus.w.v[i]);
+    const float distance = penalty.v[i] * weight.v[i];
+    penalty.v[i] = penalty_of(penalty_, {distance, coarseness_of(view, x), weight.v[i]});
+  }
+}
+
 void TileResampler::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {
   Lanes3 p;
   Lanes4 focus;
@@ -206,9 +227,9 @@ void TileResampler::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {
       weight[i] = patches_[c][i].w();
     }
     interpolate(weight, weights_[c]);
-    distance_penalties(p, focus, views_[candidate_views_[c]].centre_in_world, weights_[c], penalties_[c]);
+    penalize(views_[candidate_views_[c]], p, focus, weights_[c], penalties_[c]);
   }
-  weights_of(penalties_, weights_, k_, same_ray, confidence);
+  weights_of(penalties_, weights_, penalty_.k, same_ray, confidence);
   for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(patches_[c], penalties_[c], colour);
 }
 
@@ -261,9 +282,9 @@ void TileResampler::blend_rough(int bx, int by, Lanes3& colour, Lanes& confidenc
       seen_lanes_[c].z.v[i] = seen.z();
       weights_[c].v[i] = seen.w();
     }
-    distance_penalties(p, focus, view.centre_in_world, weights_[c], penalties_[c]);
+    penalize(view, p, focus, weights_[c], penalties_[c]);
   }
-  weights_of(penalties_, weights_, k_, same_ray, confidence);
+  weights_of(penalties_, weights_, penalty_.k, same_ray, confidence);
   for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
 }
 

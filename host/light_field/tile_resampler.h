@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "host/blending/ray_penalty.h"
 #include "host/light_field/block_blend.h"
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
@@ -25,7 +26,8 @@ namespace mf {
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
-  TileResampler(const std::vector<FieldView>& views, const LightField& field, const EmitterBlender& emitters, int k);
+  TileResampler(const std::vector<FieldView>& views, const LightField& field, const EmitterBlender& emitters,
+                const PenaltyOptions&);
 
   // Precondition: `tile` holds resolution² texels.
   void fill(std::size_t direction, Eigen::Vector4f* tile);
@@ -67,6 +69,9 @@ class TileResampler {
   [[nodiscard]] Eigen::Vector4f mean_near_emitter(const Eigen::Vector3f& p, float part_angle) const;
   void blend_near_emitter(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
 
+  // The octaves by which a view sees the cell too coarsely; 0 when they do not count.
+  [[nodiscard]] float coarseness_of(const FieldView&, const ProxyPoint&) const;
+  void penalize(const FieldView&, const Lanes3& p, const Lanes4& focus, const Lanes& weight, Lanes& penalty) const;
   [[nodiscard]] const Vertex& vertex(int x, int y) const {
     return vertex_[static_cast<std::size_t>(y * vertices_ + x)];
   }
@@ -75,7 +80,7 @@ class TileResampler {
   const LightField& field_;
   const EmitterBlender& emitters_;
   TexelGrid grid_;
-  int k_;
+  PenaltyOptions penalty_;
   int blocks_;    // along a side
   int vertices_;  // along a side
 

@@ -26,6 +26,7 @@ svg .end { text-anchor: end; } svg .middle { text-anchor: middle; }
 svg .grid { stroke: var(--line); stroke-width: .6; } svg polyline { fill: none; stroke-width: 1.6; }
 svg .red { stroke: #d1495b; } svg .green { stroke: #3a9d5d; } svg .blue { stroke: #3b7dd8; } svg .ink { stroke: var(--ink); }
 svg .bar { fill: #3b7dd8; } svg .missing { fill: #d1495b; opacity: .45; }
+svg .emitter { fill: none; stroke: #fff; stroke-width: 1.5; paint-order: stroke; } svg text.emitter { fill: #fff; stroke: #000; font-size: 14px; }
 svg .reference { stroke: var(--ink); stroke-dasharray: 5 4; }
 table { border-collapse: collapse; font-size: .92rem; } td, th { text-align: left; padding: .2rem 1rem .2rem 0; border-bottom: 1px solid var(--line); }
 )css";

@@ -12,6 +12,7 @@
 #include "common/virtual_view.h"
 #include "host/io/image_file.h"
 #include "host/report/charts.h"
+#include "host/report/distance_picture.h"
 #include "host/report/field_pictures.h"
 #include "host/report/html.h"
 #include "host/report/page_style.h"
@@ -169,6 +170,20 @@ std::string hemisphere(const ReportInput& in) {
           figure(picture(light, "light", 1), "The light itself, mean over the plane") + "</div>");
 }
 
+std::string focus(const ReportInput& in) {
+  const std::string heading = "What the light comes from";
+  const std::string name = html_escaped(surroundings_name(in.field.surroundings));
+  if (in.field.surroundings.is_plane())
+    return section(heading, "The views are focused on the plane itself: no distance was looked for.", "");
+  constexpr int size_px = 360;
+  return section(heading,
+                 "The surface on which the views are focused (" + name +
+                     "), as the plane's middle sees it: the disc as above, the scale in metres. Grey: no distance "
+                     "stands out, and any serves. Rings: bright sources that were triangulated on their own.",
+                 "<div class=\"grid\">" + figure(distance_figure(in.field, size_px), "Distance by direction") +
+                     "</div>" + emitter_table(in.field));
+}
+
 std::string light(const ReportInput& in) {
   const ImageF map = plane_irradiance(in.field);
   double lowest = INFINITY;
@@ -234,6 +249,7 @@ std::string report_html(const ReportInput& in, const Progress& progress) {
   page += summary(in);
   page += light(in);
   page += hemisphere(in);
+  page += focus(in);
   page += sample_frames(in, progress);
   page += error_chart(in.calibration);
   page += unused_frames(in.calibration);

@@ -2,8 +2,8 @@
 //
 // What each proxy is worth on the path-traced desk capture: one session, the same poses and response, the same errors
 // against truth; both back ends on the same composite; and previews straight from the session. The capture must lie
-// beside the checkout.
-// `plane` is the baseline: the paper's way (Ihrke et al. 2008).
+// beside the checkout. `plane` is the baseline: the paper's way (Ihrke et al. 2008). And how little the light depends on
+// the number of directions. A calibrated session of the capture may be named after the flags; else it is made first.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -29,9 +29,13 @@ test::CommandOutcome mirrorfield(std::vector<std::string> arguments) {
 // The calibrated session and one light field a proxy, made when first asked for.
 class Desk {
  public:
-  Desk() {
-    ready_ = fs::exists(test::desk_folder()) &&
-             mirrorfield({"import", test::desk_folder().string(), "-o", session_}).exit_code == 0 &&
+  explicit Desk(const std::string& session) {
+    ready_ = fs::exists(test::desk_folder());
+    if (!session.empty()) {
+      session_ = session;
+      return;
+    }
+    ready_ = ready_ && mirrorfield({"import", test::desk_folder().string(), "-o", session_}).exit_code == 0 &&
              mirrorfield({"photometry", session_}).exit_code == 0 &&
              mirrorfield({"calibrate", session_}).exit_code == 0;
   }
@@ -39,12 +43,13 @@ class Desk {
   [[nodiscard]] const std::string& session() const { return session_; }
 
   // Path of the field; empty on failure.
-  [[nodiscard]] std::string field(const std::string& proxy) {
-    std::string file = folder_ / (proxy + ".lf.exr");
+  [[nodiscard]] std::string field(const std::string& proxy, int directions = 2500, int size = 128) {
+    std::string file = folder_ / (proxy + std::to_string(directions) + "x" + std::to_string(size) + ".lf.exr");
     if (fs::exists(file)) return file;
-    const bool made = mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions", "2500", "--size",
-                                   "128", "--proxy", proxy})
-                          .exit_code == 0;
+    const bool made =
+        mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions", std::to_string(directions),
+                     "--size", std::to_string(size), "--proxy", proxy})
+            .exit_code == 0;
     return made ? file : std::string();
   }
 
@@ -69,8 +74,13 @@ class Desk {
   bool ready_ = false;
 };
 
+std::string& given_session() {
+  static std::string session;
+  return session;
+}
+
 Desk& desk() {
-  static Desk desk;
+  static Desk desk(given_session());
   return desk;
 }
 
@@ -91,7 +101,10 @@ void proxy(benchmark::State& state, const std::string& name) {
   if (field.empty()) return state.SkipWithError("resample failed");
   const test::ProbeError probe =
       test::probe_error(desk().probe(field), read_exr(test::desk_folder() / "truth" / "probe_0_0_0.1.exr"));
-  const test::TableError table = test::table_error(read_light_field(field));
+  const LightField read = read_light_field(field);
+  const test::TableError table = test::table_error(read);
+  state.SetLabel(surroundings_name(read.surroundings));
+  state.counters["lamp_mm"] = 1000 * test::lamp_error_m(read);
   state.counters["probe_stop"] = probe.median_abs_stop;
   state.counters["probe_irradiance"] = probe.irradiance_ratio;
   state.counters["lamp_deg"] = probe.lamp_deg;
@@ -104,7 +117,34 @@ void proxy(benchmark::State& state, const std::string& name) {
 BENCHMARK_CAPTURE(proxy, plane, "plane")->Unit(benchmark::kSecond)->Iterations(1);
 BENCHMARK_CAPTURE(proxy, distant_sphere, "sphere:inf")->Unit(benchmark::kSecond)->Iterations(1);
 BENCHMARK_CAPTURE(proxy, best_sphere, "sphere")->Unit(benchmark::kSecond)->Iterations(1);
+BENCHMARK_CAPTURE(proxy, box, "box")->Unit(benchmark::kSecond)->Iterations(1);
 BENCHMARK_CAPTURE(proxy, automatic, "auto")->Unit(benchmark::kSecond)->Iterations(1);
+
+// Irradiance on the bare plane, mean over the rectangle, green.
+double mean_irradiance(const LightField& field) {
+  const ImageF map = plane_irradiance(field);
+  double sum = 0;
+  for (std::size_t i = 1; i < map.data.size(); i += 3) sum += static_cast<double>(map.data[i]);
+  return 3 * sum / static_cast<double>(map.data.size());
+}
+
+// What the plane receives, relative to 2500 directions.
+void directions(benchmark::State& state) {
+  if (!desk().ready()) return state.SkipWithError("the desk capture is absent");
+  constexpr int size = 64;
+  std::string field;
+  for (auto _ : state) field = desk().field("auto", static_cast<int>(state.range(0)), size);
+  if (field.empty()) return state.SkipWithError("resample failed");
+  const LightField read = read_light_field(field);
+  const LightField usual = read_light_field(desk().field("auto", 2500, size));
+  const ImageF truth = read_exr(test::desk_folder() / "truth" / "probe_0_0_0.1.exr");
+  state.counters["relative_irradiance"] = mean_irradiance(read) / mean_irradiance(usual);
+  state.counters["probe_irradiance"] = test::probe_error(desk().probe(field), truth).irradiance_ratio;
+  const test::TableError table = test::table_error(read);
+  state.counters["table_mean"] = table.mean_ratio;
+  state.counters["table_rms"] = table.relative_rms;
+}
+BENCHMARK(directions)->Arg(500)->Arg(2500)->Arg(9000)->Unit(benchmark::kSecond)->Iterations(1);
 
 // RMS of the difference over the mean, over all but the `worst` share of the pixels that the object changes.
 double relative_rms(const ImageF& a, const ImageF& b, const ImageF& plate, double worst) {
@@ -226,4 +266,9 @@ BENCHMARK_CAPTURE(preview, composite, "composite")->Unit(benchmark::kSecond)->It
 }  // namespace
 }  // namespace mf
 
-BENCHMARK_MAIN();
+int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  if (argc > 1) mf::given_session() = argv[1];
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

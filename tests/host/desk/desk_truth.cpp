@@ -20,6 +20,7 @@ constexpr double board_half_m = 0.2;
 constexpr double square_m = 0.05;
 constexpr double board_top_m = 0.0005;
 const Eigen::Vector3d white_albedo(0.75, 0.75, 0.72);
+const Eigen::Vector3f lamp_in_world(0.5F, 0.32F, 0.85F);
 
 double luminance(const ImageF& picture, int x, int y) {
   return 0.2126 * static_cast<double>(picture.at(x, y, 0)) + 0.7152 * static_cast<double>(picture.at(x, y, 1)) +
@@ -153,6 +154,13 @@ ProbeError probe_error(const ImageF& ours, const ImageF& truth) {
   error.irradiance_ratio = a.irradiance / b.irradiance;
   error.lamp_deg = std::acos(std::min(a.brightest.dot(b.brightest), 1.0)) * 180 / pi;
   return error;
+}
+
+double lamp_error_m(const LightField& field) {
+  double least = INFINITY;
+  for (const ShadedEmitter& e : field.emitters)
+    least = std::min(least, static_cast<double>((e.emitter.position - lamp_in_world).norm()));
+  return least;
 }
 
 TableError table_error(const LightField& field) {

@@ -32,6 +32,12 @@ TEST_F(DeskLight, ProbeIsRight) {
   EXPECT_LE(error.lamp_deg, 1);
 }
 
+TEST_F(DeskLight, TheLampIsFoundInSpace) {
+  const double error_m = lamp_error_m(read_light_field(light_field()));
+  std::cout << "lamp: " << 1000 * error_m << " mm from its place\n";
+  EXPECT_LE(error_m, 0.03);
+}
+
 TEST_F(DeskLight, TheTableCarriesTheLeavesShadows) {
   const TableError error = table_error(read_light_field(light_field()));
   std::cout << "table: correlation " << error.correlation << ", relative RMS " << error.relative_rms << ", mean "

@@ -35,7 +35,7 @@ class JustInTime : public ::testing::Test {
     options.proxy = "sphere:1.2";
     const Resampling focused(*views_, square, options, Team(), Progress());
     focused_ = new LightField(focused.field());
-    k_ = focused.k();
+    penalty_ = focused.penalty();
     whole_ = new LightField(resample(*views_, square, options, Progress()).field);
   }
   static void TearDownTestSuite() {
@@ -45,7 +45,7 @@ class JustInTime : public ::testing::Test {
   }
 
   static std::vector<PlaneTile> tiles(const std::vector<TileRequest>& requests, int most_texels) {
-    return resample_just_in_time(*views_, *focused_, k_, requests, {most_texels});
+    return resample_just_in_time(*views_, *focused_, penalty_, requests, {most_texels});
   }
 
   // Light of all requests at p: Σ tile(p) · solid angle of its cells.
@@ -60,12 +60,12 @@ class JustInTime : public ::testing::Test {
 
   static std::vector<FieldView>* views_;
   static LightField* focused_;  // no texels
-  static int k_;
+  static PenaltyOptions penalty_;
   static LightField* whole_;
 };
 std::vector<FieldView>* JustInTime::views_ = nullptr;
 LightField* JustInTime::focused_ = nullptr;
-int JustInTime::k_ = 0;
+PenaltyOptions JustInTime::penalty_;
 LightField* JustInTime::whole_ = nullptr;
 
 // Runs of seven cells each, over the given part of the plane.

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "common/error.h"
 
@@ -39,6 +40,42 @@ TEST(ReferenceScale, MakesTheDiscReadWhatTheMeterRead) {
         ++count;
       }
   EXPECT_NEAR(sum / count, 7, 1e-5);
+}
+
+// A noisy mosaic on an even slope: the disc's own 28 pixels say it to 4 %, with what is around it to two.
+TEST(ReferenceScale, ReadsPastTheNoiseOfASmallDisc) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0, 0.12);
+  const PixelFormat bayer{PixelLayout::bayer_rg, 12, false};
+  const ResponseCurve curve = linear_response(12, 64, 4031, 3);
+  double squares = 0;
+  constexpr int rounds = 60;
+  for (int round = 0; round < rounds; ++round) {
+    Frame frame;
+    frame.info.exposure_s = 1;
+    ImageU16 codes(80, 80, 1);
+    for (int y = 0; y < 80; ++y)
+      for (int x = 0; x < 80; ++x)
+        codes.at(x, y) = static_cast<std::uint16_t>(64.5 + (600 + 4 * (x + 0.5 - 40)) * (1 + noise(random)));
+    frame.pixels = codes;
+    const SessionHeader::Reference meter{"scene.png", 40, 40, 3, {1, 1, 1}};
+    const std::vector<double> scale = reference_scale(meter, frame, bayer, curve, "S");
+    const double truth = 1.0 / 600;
+    for (const double s : scale) squares += std::pow(s / truth - 1, 2);
+  }
+  EXPECT_LT(std::sqrt(squares / (3 * rounds)), 0.026);
+}
+
+// A bright thing beside the disc is none of the meter's business.
+TEST(ReferenceScale, StaysWithinAnEvenPatch) {
+  Frame frame = scene(40);
+  ImageU16& codes = std::get<ImageU16>(frame.pixels);
+  for (int y = 0; y < 10; ++y)
+    for (int x = 14; x < 20; ++x)
+      for (int c = 0; c < 3; ++c) codes.at(x, y, c) = 200;
+  const std::vector<double> scale =
+      reference_scale({"scene.png", 10, 5, 3, {1, 1, 1}}, frame, rgb8, linear_response(8, 5, 250, 3), "S");
+  EXPECT_NEAR(scale[1], 0.5 / 35, 1e-6);
 }
 
 void expect_refused(const SessionHeader::Reference& meter, std::uint16_t code, const std::string& word) {
