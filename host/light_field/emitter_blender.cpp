@@ -71,6 +71,12 @@ Eigen::Vector3f unhidden_radiance(const std::vector<FieldView>& views, const Emi
 
 }  // namespace
 
+int splits_near_emitter(float cell_solid_angle_sr) {
+  constexpr float largest_part_sr = 6e-5F;  // a cell of 2500 directions in 48 parts
+  constexpr int fewest = 3, most = 7;
+  return std::clamp(static_cast<int>(std::ceil(std::log2(cell_solid_angle_sr / (6 * largest_part_sr)))), fewest, most);
+}
+
 EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
                                std::span<const Emitter> emitters, const PlaneRectangle& rectangle, const Team& team)
     : views_(views), surroundings_(surroundings) {

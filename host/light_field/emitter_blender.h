@@ -13,6 +13,10 @@
 
 namespace mf {
 
+// In how many parts a cell beside an emitter is looked at: 6 · 2ⁿ with this n, so that each is smaller than the lamps
+// that matter, however large the cells: a lamp's energy then does not depend on the number of directions.
+[[nodiscard]] int splits_near_emitter(float cell_solid_angle_sr);
+
 // Rays at and about small bright sources, blended with care for what else is known there.
 //
 // A lamp is thousands of times brighter than what surrounds it, and its edge and the leaves before it lie at different

@@ -19,8 +19,7 @@ namespace mf {
 
 namespace {
 
-constexpr int emitter_step = 4;    // texels of the light field between the points at which emitters are drawn, as there
-constexpr int emitter_splits = 3;  // a cell's parts for them: 6 · 2³, as there
+constexpr int emitter_step = 4;  // texels of the light field between the points at which emitters are drawn, as there
 // A preview's texels are no larger. The resampler looks for emitters at every fourth texel, and must not step over the
 // glare beside one, which it takes to reach 12 cm.
 constexpr float coarsest_texel_m = 0.05F;
@@ -210,7 +209,7 @@ bool Worker::add_emitters(std::uint32_t cell, float share, PlaneTile& emitted) {
       const Eigen::Vector3f p = origin + turn * Eigen::Vector3f(at.x(), at.y(), 0);
       if (!near(p)) continue;
       if (parts_.empty()) {
-        parts_ = split_cell(part_.directions, cell, emitter_splits);
+        parts_ = split_cell(part_.directions, cell, splits_near_emitter(solid_angle));
         for (CellSample& part : parts_) part.direction = turn * part.direction;
       }
       const Eigen::Vector4f light = emitted_at(p, angle / std::sqrt(static_cast<float>(parts_.size()))) / solid_angle;

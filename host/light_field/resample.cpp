@@ -137,7 +137,8 @@ std::size_t Resampling::fill(std::size_t direction, Eigen::Vector4f* tile) {
 
 Provenance Resampling::provenance(std::vector<std::string> frame_names) const {
   // The plane goes without emitters.
-  const EmitterBlender none(impl_->views, impl_->field.surroundings, std::vector<ShadedEmitter>{});
+  const EmitterBlender none(impl_->views, impl_->field.surroundings, std::vector<ShadedEmitter>{},
+                            EmitterBlender::Lit::yes);
   return trace_provenance(impl_->views, impl_->field, impl_->emitters ? *impl_->emitters : none, impl_->penalty,
                           std::move(frame_names));
 }
@@ -215,8 +216,8 @@ struct Tally {
   void enter(ResampleResult& result) const {
     const double threads = tbb::this_task_arena::max_concurrency();
     result.mean_confidence = confidence / weights;
-    result.filled_share = static_cast<double>(filled) / static_cast<double>(result.field.directions.size() *
-                                                                            result.field.texel_count());
+    result.filled_share =
+        static_cast<double>(filled) / static_cast<double>(result.field.directions.size() * result.field.texel_count());
     result.seconds["blending"] = blending_s / threads;
     result.seconds["packing"] = packing_s / threads;
   }

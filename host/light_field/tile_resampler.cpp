@@ -15,7 +15,6 @@ namespace {
 constexpr int block_vertices = block_side / vertex_step;
 constexpr std::size_t spare_views = 4;  // ranked beyond k, so that the k best of any texel are among its corners' lists
 constexpr std::size_t spare_views_near_emitter = 26;  // there many views have no say
-constexpr int fine_splits = 3;                        // and a cell near an emitter in 6 · 2³
 constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
 constexpr float same_ray = 1e-4F;                     // rays closer than this are the same
 constexpr float largest_jump = 0.1F;                  // of the cell, see is_rough()
@@ -75,7 +74,7 @@ void TileResampler::prepare(std::size_t i) {
     }
   cell_.fine_parts.clear();
   if (!emitter) return;
-  cell_.fine_parts = split_cell(field_.directions, i, fine_splits);
+  cell_.fine_parts = split_cell(field_.directions, i, splits_near_emitter(field_.directions.solid_angles_sr[i]));
   for (CellSample& part : cell_.fine_parts) part.direction = world_from_plane * part.direction;
 }
 
@@ -132,8 +131,8 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
   auto& best = best_lookers_[corner];
   best.clear();
   float farthest = 0;
-  for (const ViewPenalty& found :
-       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(penalty_.k) + spare, squared_penalty)) {
+  for (const ViewPenalty& found : ranking_.find(bounds_.data(), lookers_.views.size(),
+                                                static_cast<std::size_t>(penalty_.k) + spare, squared_penalty)) {
     best.push_back(found.view);
     farthest = std::max(farthest, bounds_[found.view]);
   }

@@ -27,13 +27,14 @@ std::vector<FieldView> views_with_a_hole() {
   return views;
 }
 
-ResampleResult resampled(const std::vector<FieldView>& views, bool fill, const std::string& proxy) {
+ResampleResult resampled(const std::vector<FieldView>& views, bool fill, const std::string& proxy,
+                         const PlaneRectangle& rectangle = square) {
   ResampleOptions options;
   options.directions = 400;
   options.size = 8;
   options.proxy = proxy;
   options.fill = fill;
-  return resample(views, square, options, {});
+  return resample(views, rectangle, options, {});
 }
 
 TEST(PullPush, KeepsWhatIsKnownAndClosesTheRest) {
@@ -102,8 +103,9 @@ TEST(Holes, ProbesShowTheGuessWithoutConfidence) {
 
 // The plane proxy knows no panorama: a tile is closed by itself.
 TEST(Holes, ThePlaneClosesItsTiles) {
-  const auto views = testing::analytic_views(2, 0.1F, 48, sky);  // each sees a part of the rectangle
-  const ResampleResult black = resampled(views, false, "plane"), filled = resampled(views, true, "plane");
+  const auto views = testing::analytic_views(2, 0.1F, 48, sky);
+  const PlaneRectangle wide{{}, {-1, -1}, {1, 1}};  // each sees a part of it
+  const ResampleResult black = resampled(views, false, "plane", wide), filled = resampled(views, true, "plane", wide);
   std::size_t holes = 0;
   for (std::size_t i = 0; i < filled.field.directions.size(); ++i) {
     bool any = false;

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <fstream>
 
+#include "common/error.h"
 #include "host/io/mesh.h"
 #include "host/light_field/proxy_choice.h"
 #include "host/light_field/resample.h"
 #include "host/light_field/room_search.h"
 #include "host/tracing/ray_scene.h"
 #include "tests/host/light_field/synthetic_views.h"
-#include "common/error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mf {
@@ -31,8 +31,8 @@ TriangleMesh room_mesh() {
   TriangleMesh mesh;
   for (const float z : {-1.0F, room.ceiling})
     for (int i = 0; i < 4; ++i)
-      mesh.positions.emplace_back(i == 0 || i == 3 ? room.low.x() : room.high.x(),
-                                  i < 2 ? room.low.y() : room.high.y(), z);
+      mesh.positions.emplace_back(i == 0 || i == 3 ? room.low.x() : room.high.x(), i < 2 ? room.low.y() : room.high.y(),
+                                  z);
   for (std::uint32_t i = 0; i < 4; ++i) {
     const std::uint32_t j = (i + 1) % 4;
     mesh.triangles.push_back({i, j, j + 4});
@@ -104,8 +104,7 @@ TEST(Proxies, ARoomOfTrianglesIsTheRoom) {
 // What stands before a wall is met first, and only there; what the mesh does not have is distant.
 TEST(Proxies, AMeshIsMetAtItsFirstTriangle) {
   TriangleMesh mesh;
-  mesh.positions = {{-0.1F, -0.1F, 0.5F}, {0.1F, -0.1F, 0.5F}, {0, 0.1F, 0.5F},
-                    {-1, -1, 1},          {1, -1, 1},          {0, 1, 1}};
+  mesh.positions = {{-0.1F, -0.1F, 0.5F}, {0.1F, -0.1F, 0.5F}, {0, 0.1F, 0.5F}, {-1, -1, 1}, {1, -1, 1}, {0, 1, 1}};
   mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
   const Surroundings s = mesh_surroundings({0, 0, 0}, std::make_shared<const RayScene>(mesh), "two.obj");
   const Eigen::Vector3f up(0, 0, 1);
@@ -133,7 +132,8 @@ TEST(Proxies, TheRightRoomIsSharperThanTheWrongOne) {
     }
     return sum / count;
   };
-  const double right = error_with("box:-1.2,-0.9,1.6,2.2,1.9"), found = error_with("box"), far = error_with("sphere:inf");
+  const double right = error_with("box:-1.2,-0.9,1.6,2.2,1.9"), found = error_with("box"),
+               far = error_with("sphere:inf");
   EXPECT_LT(right, 0.6 * far);
   EXPECT_LT(found, 0.7 * far);
 }
@@ -143,10 +143,10 @@ TEST(Proxies, BadShapesAreNamed) {
   const test::TemporaryFolder folder;
   const std::string below = folder / "below.obj";
   std::ofstream(below) << "v -1 -1 -1\nv 1 -1 -1\nv 0 1 -1\nf 1 2 3\n";
-  EXPECT_THROW((void)choose_proxy(views, square, "mesh:" + below, 6, {}), InputError);
-  EXPECT_THROW((void)choose_proxy(views, square, "mesh:missing.obj", 6, {}), InputError);
-  EXPECT_THROW((void)choose_proxy(views, square, "box:-0.1,-1,1,1,2", 6, {}), InputError);
-  EXPECT_THROW((void)choose_proxy(views, square, "box:-1,-1,1,1,-0.5", 6, {}), InputError);
+  EXPECT_THROW((void)choose_proxy(views, square, "mesh:" + below, 6, {}, Team()), InputError);
+  EXPECT_THROW((void)choose_proxy(views, square, "mesh:missing.obj", 6, {}, Team()), InputError);
+  EXPECT_THROW((void)choose_proxy(views, square, "box:-0.1,-1,1,1,2", 6, {}, Team()), InputError);
+  EXPECT_THROW((void)choose_proxy(views, square, "box:-1,-1,1,1,-0.5", 6, {}, Team()), InputError);
 }
 
 TEST(Proxies, FilesKeepTheShape) {
