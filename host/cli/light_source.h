@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/progress.h"
+#include "host/io/mesh.h"
 #include "host/light_field/resample.h"
 #include "host/render/incident_light.h"
-#include "host/io/mesh.h"
 
 namespace mf {
 

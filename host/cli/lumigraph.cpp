@@ -80,7 +80,8 @@ VisibilityOptions visibility_of(const LumigraphArguments& a) {
 
 PhotoSet read_photos(const LumigraphArguments& a) {
   if ((a.colmap.empty() ? 0 : 1) + (a.transforms.empty() ? 0 : 1) + (a.session.empty() ? 0 : 1) != 1)
-    throw InputError("lumigraph", "", "needs photos: give one of --colmap FOLDER, --transforms FILE and --session FOLDER");
+    throw InputError("lumigraph", "",
+                     "needs photos: give one of --colmap FOLDER, --transforms FILE and --session FOLDER");
   if (!(a.scale > 0 && a.scale <= 1)) throw InputError("lumigraph", "--scale", "must be above 0 and at most 1");
   if (!a.session.empty()) return read_session_photos(a.session, a.scale, a.scene, progress_bar());
   PhotoSet set = a.colmap.empty() ? read_transforms(a.transforms) : read_colmap(a.colmap);
@@ -90,13 +91,13 @@ PhotoSet read_photos(const LumigraphArguments& a) {
 }
 
 Proxy proxy_of(const LumigraphArguments& a, const PhotoSet& set) {
-  Proxy proxy = a.session.empty()
-                    ? make_proxy(a.proxy.empty() ? "plane" : a.proxy, set,
-                                 a.colmap.empty() ? a.transforms.parent_path() : a.colmap)
-                    : session_proxy(a.proxy.empty() ? "auto" : a.proxy, set, a.session, progress_bar());
+  Proxy proxy = a.session.empty() ? make_proxy(a.proxy.empty() ? "plane" : a.proxy, set,
+                                               a.colmap.empty() ? a.transforms.parent_path() : a.colmap)
+                                  : session_proxy(a.proxy.empty() ? "auto" : a.proxy, set, a.session, progress_bar());
   if (a.save_proxy.empty()) return proxy;
   const auto* mesh = std::get_if<MeshProxy>(&proxy);
-  if (mesh == nullptr) throw InputError("lumigraph", "--save-proxy", "saves a mesh: give --proxy hull, or a session's auto");
+  if (mesh == nullptr)
+    throw InputError("lumigraph", "--save-proxy", "saves a mesh: give --proxy hull, or a session's auto");
   write_obj(a.save_proxy, mesh->mesh);
   return proxy;
 }
@@ -180,20 +181,21 @@ void run_two_plane(const LumigraphArguments& a, const PhotoSet& set, const Lumig
   const TwoPlane planes = two_plane_of(a, set, lumigraph);
   const TwoPlaneSummary written = write_two_plane(a.output, lumigraph, planes, options_of(a, set), progress_bar());
   const fs::path transforms = a.output / "transforms.json";
-  print_summary(a.json,
-                {{"pictures", written.pictures},
-                 {"covered", written.covered},
-                 {"layout", to_json(planes)},
-                 {"proxy", describe(lumigraph.proxy())},
-                 {"photos", lumigraph.sources().size()},
-                 {"transforms", transforms.string()},
-                 {"seconds", seconds_since(start)}},
-                fmt::format("{} × {} cameras over {:.3g} × {:.3g} m, pictures {} × {} of a window {:.3g} × {:.3g} m at "
-                            "{:.4g} m, {:.0f} % covered; {:.1f} s\nopen it: mirrorfield view --transforms {} --proxy plane:{:.6g}\n",
-                            planes.cameras[0], planes.cameras[1], planes.uv_size_m.x(), planes.uv_size_m.y(),
-                            planes.size_px[0], planes.size_px[1], planes.st_size_m.x(), planes.st_size_m.y(),
-                            planes.st_distance_m, 100 * written.covered, seconds_since(start), transforms.string(),
-                            planes.st_distance_m));
+  print_summary(
+      a.json,
+      {{"pictures", written.pictures},
+       {"covered", written.covered},
+       {"layout", to_json(planes)},
+       {"proxy", describe(lumigraph.proxy())},
+       {"photos", lumigraph.sources().size()},
+       {"transforms", transforms.string()},
+       {"seconds", seconds_since(start)}},
+      fmt::format(
+          "{} × {} cameras over {:.3g} × {:.3g} m, pictures {} × {} of a window {:.3g} × {:.3g} m at "
+          "{:.4g} m, {:.0f} % covered; {:.1f} s\nopen it: mirrorfield view --transforms {} --proxy plane:{:.6g}\n",
+          planes.cameras[0], planes.cameras[1], planes.uv_size_m.x(), planes.uv_size_m.y(), planes.size_px[0],
+          planes.size_px[1], planes.st_size_m.x(), planes.st_size_m.y(), planes.st_distance_m, 100 * written.covered,
+          seconds_since(start), transforms.string(), planes.st_distance_m));
 }
 
 // A frame that shows nothing is a mistake of the path or the proxy, not a black picture.
@@ -255,7 +257,8 @@ void check_proxy_is_seen(const Lumigraph& lumigraph, const LumigraphArguments& a
 void run(LumigraphArguments& a) {
   const auto start = std::chrono::steady_clock::now();
   if ((a.leave_one_out ? 1 : 0) + (a.camera_path.empty() ? 0 : 1) + (a.two_plane.empty() ? 0 : 1) != 1)
-    throw InputError("lumigraph", "", "needs a task: give one of --camera-path FILE, --two-plane U,V and --leave-one-out");
+    throw InputError("lumigraph", "",
+                     "needs a task: give one of --camera-path FILE, --two-plane U,V and --leave-one-out");
   const PhotoSet set = read_photos(a);
   const Lumigraph lumigraph(set, proxy_of(a, set), visibility_of(a), progress_bar());
   check_proxy_is_seen(lumigraph, a);
@@ -276,15 +279,21 @@ void add_lumigraph_command(CommandLine& program) {
   command.option("--transforms", a->transforms, "transforms.json of nerfstudio or instant-ngp");
   command.option("--session", a->session, "folder of a calibrated session: what its frames saw in the mirror");
   command.flag("--scene", a->scene, "with --session: its pictures without the mirror too");
-  command.option("--proxy", a->proxy,
-                 "plane (default), plane:D, sphere:R, box, box:x0,y0,z0,x1,y1,z1, tunnel:W,H[,D], hull[:N] or a mesh; with "
-                 "--session also auto (default) or a light field, NAME.lf.exr");
-  command.option("--save-proxy", a->save_proxy, "OBJ file for a proxy that was found: a hull, a session's surroundings");
-  command.option("--mask-below", a->mask_below, "photos without a mask: pixels whose channels are all at most this are background");
-  command.option("--camera-path", a->camera_path, "JSON of the views to make: a list of views, or key frames (docs/lumigraph.md)");
+  command.option(
+      "--proxy", a->proxy,
+      "plane (default), plane:D, sphere:R, box, box:x0,y0,z0,x1,y1,z1, tunnel:W,H[,D], hull[:N] or a mesh; with "
+      "--session also auto (default) or a light field, NAME.lf.exr");
+  command.option("--save-proxy", a->save_proxy,
+                 "OBJ file for a proxy that was found: a hull, a session's surroundings");
+  command.option("--mask-below", a->mask_below,
+                 "photos without a mask: pixels whose channels are all at most this are background");
+  command.option("--camera-path", a->camera_path,
+                 "JSON of the views to make: a list of views, or key frames (docs/lumigraph.md)");
   command.flag("--leave-one-out", a->leave_one_out, "foretell every photo from the others, and say how well");
-  command.option("--two-plane", a->two_plane, "write a two-plane light field: U,V (cameras each way), or the file of a layout");
-  command.option("--st-distance", a->st_distance, "with --two-plane U,V: metres between the planes (default: where the proxy is)");
+  command.option("--two-plane", a->two_plane,
+                 "write a two-plane light field: U,V (cameras each way), or the file of a layout");
+  command.option("--st-distance", a->st_distance,
+                 "with --two-plane U,V: metres between the planes (default: where the proxy is)");
   command.option("-o,--output", a->output, "folder for the pictures");
   command.option("-k", a->k, "photos that speak for a ray");
   command.option("--angle", a->angle, "α: penalty per radian between the wanted ray and the photo's");

@@ -45,10 +45,11 @@ Why explain(const ProbeArguments& a, const LightField& field, const Eigen::Vecto
     throw InputError(a.provenance.string(), "", "belongs to another field: resample again with --provenance");
   const FieldSampler sampler(field);
   const auto ray = sampler.field_ray(at, towards.normalized());
-  if (!ray) throw InputError("probe", "--why", "looks along or below the plane: no light of the field comes from there");
+  if (!ray)
+    throw InputError("probe", "--why", "looks along or below the plane: no light of the field comes from there");
   const DirectionWeights near = sampler.locator().locate(ray->direction);
-  const auto nearest = static_cast<std::size_t>(std::max_element(near.weight.begin(), near.weight.end()) -
-                                                near.weight.begin());
+  const auto nearest =
+      static_cast<std::size_t>(std::max_element(near.weight.begin(), near.weight.end()) - near.weight.begin());
   const std::size_t direction = near.index[nearest];
   const std::size_t block = provenance.block_at(field.plane, field.resolution, direction, ray->p_in_plane);
   Why why{{{"direction", direction}, {"emitter", nullptr}, {"frames", nlohmann::json::array()}}, ""};

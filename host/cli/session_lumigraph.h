@@ -17,8 +17,8 @@ namespace mf {
                                            const Progress&);
 
 // What a session's rays come from, by name: "auto" finds a distance per direction as resample does; NAME.lf.exr takes
-// what a light field was focused on; else as make_proxy(), a mesh as walls about the views. A session's masks are the mirror's opening, no silhouettes:
-// "hull" is refused. Throws InputError.
+// what a light field was focused on; else as make_proxy(), a mesh as walls about the views. A session's masks are the
+// mirror's opening, no silhouettes: "hull" is refused. Throws InputError.
 [[nodiscard]] Proxy session_proxy(const std::string& name, const PhotoSet&, const std::filesystem::path& folder,
                                   const Progress&);
 

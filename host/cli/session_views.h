@@ -15,7 +15,7 @@ namespace mf {
 struct SessionViews {
   std::vector<FieldView> views;
   PlaneRectangle rectangle;
-  bool absolute = false;  // radiance is in the units of the reference reading
+  bool absolute = false;                 // radiance is in the units of the reference reading
   std::vector<std::string> frame_names;  // of the calibration, which FieldView::frame indexes
 };
 

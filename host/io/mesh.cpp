@@ -111,7 +111,8 @@ void write_obj(const std::filesystem::path& path, const TriangleMesh& mesh) {
   std::string text;
   for (const Eigen::Vector3f& p : mesh.positions) text += fmt::format("v {} {} {}\n", p.x(), p.y(), p.z());
   for (const Eigen::Vector3f& n : mesh.normals) text += fmt::format("vn {} {} {}\n", n.x(), n.y(), n.z());
-  for (const auto& [a, b, c] : mesh.triangles) text += fmt::format("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1);
+  for (const auto& [a, b, c] : mesh.triangles)
+    text += fmt::format("f {0}//{0} {1}//{1} {2}//{2}\n", a + 1, b + 1, c + 1);
   write_file_atomically(path, text);
 }
 

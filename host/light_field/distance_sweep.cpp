@@ -25,7 +25,7 @@ constexpr std::size_t fewest_votes = 4;
 constexpr float doubt_votes = 8;               // a cost counts as if so many further votes had said doubt_stops:
 constexpr float doubt_stops = 0.6F;            // few views that happen to agree are no evidence
 constexpr float far_preference_stops = 0.05F;  // by which the nearest level must be better than the farthest
-constexpr float smoothing_cells = 1.3F;   // σ over directions
+constexpr float smoothing_cells = 1.3F;        // σ over directions
 
 float cost_of(std::vector<float>& votes, int level) {
   const float n = static_cast<float>(votes.size()), spread = static_cast<float>(robust_spread(votes, occluded_stops));
@@ -81,8 +81,8 @@ DistanceSweep sweep_surroundings(const std::vector<FieldView>& views, const Plan
     std::vector<float> votes;
     for (int x = 0; x < map_size; ++x)
       for (int level = 0; level < level_count; ++level) {
-        const ProxyPoint point = proxy_point(sweep.centre_in_world, sweep.direction(x, y),
-                                             static_cast<float>(level) * sweep.level_step);
+        const ProxyPoint point =
+            proxy_point(sweep.centre_in_world, sweep.direction(x, y), static_cast<float>(level) * sweep.level_step);
         votes.clear();
         for (const FieldView& view : views)
           if (const auto value = log_luminance(view, point, sweep_angle_rad)) votes.push_back(*value);
@@ -118,9 +118,7 @@ void continue_path(std::span<const float> before, std::span<const float> own, st
 DistanceSweep regularized(const DistanceSweep& sweep) {
   const int side = sweep.side();
   const auto levels = static_cast<std::size_t>(sweep.levels());
-  const auto cell = [&](int x, int y) {
-    return static_cast<std::size_t>(y * side + x) * levels;
-  };
+  const auto cell = [&](int x, int y) { return static_cast<std::size_t>(y * side + x) * levels; };
   std::vector<float> own(static_cast<std::size_t>(side * side) * levels), sum(own.size(), 0.0F);
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x)

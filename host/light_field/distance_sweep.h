@@ -36,9 +36,10 @@ struct DistanceSweep {
 [[nodiscard]] DistanceSweep sweep_surroundings(const std::vector<FieldView>& views, const PlaneRectangle&,
                                                const Team& = {});
 
-// Costs that also count what the directions around would have to pay: along eight paths over the map each direction adds
-// the least cost of its predecessor, plus a little for the next level and more for any farther one (semi-global matching,
-// Hirschmüller 2008, eq. 13). Directions that few views know take the distance of those around them; edges stay.
+// Costs that also count what the directions around would have to pay: along eight paths over the map each direction
+// adds the least cost of its predecessor, plus a little for the next level and more for any farther one (semi-global
+// matching, Hirschmüller 2008, eq. 13). Directions that few views know take the distance of those around them; edges
+// stay.
 [[nodiscard]] DistanceSweep regularized(const DistanceSweep&);
 
 // log2 luminance of what a view shows of the proxy point, over about `angle_rad`; nothing when it does not see it well

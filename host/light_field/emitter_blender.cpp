@@ -104,6 +104,14 @@ std::uint32_t EmitterBlender::concerned(const Eigen::Vector3f& p, const Eigen::V
   return found == emitters_.end() ? 0 : 1 + static_cast<std::uint32_t>(found - emitters_.begin());
 }
 
+bool EmitterBlender::may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
+  return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
+    const Eigen::Vector3f to = s.emitter.position - p;
+    const float along = to.dot(direction);
+    return along > 0 && to.cross(direction).norm() < s.emitter.radius_m + angle_rad * along;
+  });
+}
+
 const ShadedEmitter* EmitterBlender::met_by(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                                             float scale) const {
   for (const ShadedEmitter& s : emitters_)

@@ -44,6 +44,9 @@ class EmitterBlender {
     return concerned(p, direction, angle_rad) != 0;
   }
 
+  // Whether rays within `angle_rad` of the direction may meet one.
+  [[nodiscard]] bool may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
+
   // Blended colour and weight of one ray with a footprint of `angle_rad`; only `candidates` are asked (indices of
   // views).
   [[nodiscard]] Eigen::Vector4f radiance(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad,

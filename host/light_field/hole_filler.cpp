@@ -106,8 +106,7 @@ Eigen::Vector3f HoleFiller::guess(std::size_t direction, const Eigen::Vector3f& 
   for (const CellSample& part : split_cell(field_.directions, direction, 1)) {
     const Eigen::Vector3f d = turn * part.direction;
     const float inverse = closed_.inverse_distance_along(p, d);
-    const Eigen::Vector4f seen =
-        closed_.panorama_at((d + inverse * (p - closed_.centre_in_world)).normalized());
+    const Eigen::Vector4f seen = closed_.panorama_at((d + inverse * (p - closed_.centre_in_world)).normalized());
     sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
   }
   return sum.w() > 0 ? Eigen::Vector3f(sum.head<3>() / sum.w()) : Eigen::Vector3f::Zero();

@@ -14,8 +14,8 @@ namespace mf {
 // What no view saw of a direction lies, as seen from the rectangle's centre, in a hole of the surroundings' panorama.
 // That is closed by pull-push (Gortler, Grzeszczuk, Szeliski, Cohen 1996, §3.4.2): coarser and coarser means of what is
 // known, then down again into what is not. A texel takes its cell's mean from there: so light flows from neighbouring
-// directions, and from neighbouring places by their parallax. The plane proxy has no panorama: there each tile is closed
-// by itself, and a direction that no view saw at all stays black.
+// directions, and from neighbouring places by their parallax. The plane proxy has no panorama: there each tile is
+// closed by itself, and a direction that no view saw at all stays black.
 //
 // A guess is never a lamp: emitters are not in the panorama, and what is brighter than four times the median counts as
 // that.

@@ -195,19 +195,12 @@ bool Worker::add_emitters(std::uint32_t cell, float share, PlaneTile& emitted) {
   const Eigen::Vector3f direction = turn * part_.directions.directions[cell];
   const float solid_angle = part_.directions.solid_angles_sr[cell];
   const float angle = std::sqrt(solid_angle);  // a cell's corners are nearer to its direction than that
-  const auto near = [&](const Eigen::Vector3f& p) {
-    return std::any_of(focused_.emitters.begin(), focused_.emitters.end(), [&](const ShadedEmitter& e) {
-      const Eigen::Vector3f to = e.emitter.position - p;
-      const float along = to.dot(direction);
-      return along > 0 && to.cross(direction).norm() < e.emitter.radius_m + angle * along;
-    });
-  };
   parts_.clear();
   for (int y = 0; y < emitted.height; ++y)
     for (int x = 0; x < emitted.width; ++x) {
       const Eigen::Vector2f at = emitted.position(x, y);
       const Eigen::Vector3f p = origin + turn * Eigen::Vector3f(at.x(), at.y(), 0);
-      if (!near(p)) continue;
+      if (!lit_.may_meet(p, direction, angle)) continue;
       if (parts_.empty()) {
         parts_ = split_cell(part_.directions, cell, splits_near_emitter(solid_angle));
         for (CellSample& part : parts_) part.direction = turn * part.direction;

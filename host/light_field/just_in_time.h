@@ -19,7 +19,8 @@ struct JustInTimeOptions {
 
 // The light of some cells over some parts of the plane, straight from the views: what merged_tiles makes of the whole
 // light field, without the rest of it (Ihrke et al. 2008, future work). `focused` is a light field without texels
-// (Resampling::field), whose resolution says how finely emitters are drawn. What no view saw is guessed (hole_filler.h).
+// (Resampling::field), whose resolution says how finely emitters are drawn. What no view saw is guessed
+// (hole_filler.h).
 //
 // The tiles reach at least over the requests' rectangles, and no farther than the light field's, which a request
 // beyond it is moved to: there the rim's value holds on. With the plane as proxy they are over all of it: few texels

@@ -27,9 +27,9 @@ struct PlaneRectangle {
 //
 // For every direction a tile of resolution² texels over the rectangle; texel (0, 0) is at (min x, max y): a tile seen
 // in a viewer has +x right and +y up. `rgbc` holds half-float-exact values as float: red, green, blue, confidence; by
-// direction, then row, column. Confidence is 1 where views answered fully, 0 where no view looked: colour is then a guess
-// (see hole_filler.h), or 0 where none was made.
-// Each direction stands for its cell: its value is the mean radiance over that solid angle.
+// direction, then row, column. Confidence is 1 where views answered fully, 0 where no view looked: colour is then a
+// guess (see hole_filler.h), or 0 where none was made. Each direction stands for its cell: its value is the mean
+// radiance over that solid angle.
 struct LightField {
   PlaneRectangle plane;
   DirectionSet directions;

@@ -34,8 +34,8 @@ struct NamedMap {
 
 // A light field from part 0's header, without its texels and maps. Throws InputError naming `file` and the attribute.
 [[nodiscard]] LightField field_without_texels(const Imf::Header&, const std::string& file);
-// The centre of the surroundings, their box or mesh if they have one, and an emitter without its mask, from the header of
-// a map's part.
+// The centre of the surroundings, their box or mesh if they have one, and an emitter without its mask, from the header
+// of a map's part.
 [[nodiscard]] Eigen::Vector3f centre_from(const Imf::Header&, const std::string& file);
 void shape_from(const Imf::Header&, Surroundings&);
 [[nodiscard]] ShadedEmitter emitter_from(const Imf::Header&, const std::string& file);

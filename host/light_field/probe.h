@@ -63,8 +63,8 @@ struct Probe {
 };
 // The light at one point as a lat-long picture. The field gives each cell's light at that point; within a cell the
 // picture follows the surroundings' panorama (the field has some 3° between directions, the panorama a third of a
-// degree), scaled so that the cell keeps its mean. Confidence is 0 where no view looked (colour is then the field's guess, or zero) and below the plane.
-// Precondition: width even, ≥ 4.
+// degree), scaled so that the cell keeps its mean. Confidence is 0 where no view looked (colour is then the field's
+// guess, or zero) and below the plane. Precondition: width even, ≥ 4.
 [[nodiscard]] Probe make_probe(const LightField&, const Eigen::Vector3d& at_in_world, LatLongConvention, int width);
 
 }  // namespace mf

@@ -72,12 +72,10 @@ Imf::FrameBuffer frame_buffer_of(Provenance& p, int width) {
   const std::size_t block = static_cast<std::size_t>(p.k) * sizeof(Provenance::Share);
   for (int rank = 0; rank < p.k; ++rank) {
     Provenance::Share& first = p.shares[static_cast<std::size_t>(rank)];
-    buffer.insert(fmt::format("frame{:02}", rank),
-                  Imf::Slice(Imf::UINT, reinterpret_cast<char*>(&first.frame), block,
-                             block * static_cast<std::size_t>(width)));
-    buffer.insert(fmt::format("weight{:02}", rank),
-                  Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&first.weight), block,
-                             block * static_cast<std::size_t>(width)));
+    buffer.insert(fmt::format("frame{:02}", rank), Imf::Slice(Imf::UINT, reinterpret_cast<char*>(&first.frame), block,
+                                                              block * static_cast<std::size_t>(width)));
+    buffer.insert(fmt::format("weight{:02}", rank), Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&first.weight),
+                                                               block, block * static_cast<std::size_t>(width)));
   }
   buffer.insert("emitter", Imf::Slice(Imf::UINT, reinterpret_cast<char*>(p.emitter.data()), sizeof(std::uint32_t),
                                       sizeof(std::uint32_t) * static_cast<std::size_t>(width)));
@@ -119,7 +117,8 @@ Provenance read_provenance(const std::filesystem::path& path) {
     const auto integer = [&](const char* name) {
       const auto* found = in.header().findTypedAttribute<Imf::IntAttribute>(name);
       if (found == nullptr || found->value() < 1 || found->value() > 64)
-        throw InputError(path.string(), name, "is missing: this was not written by 'mirrorfield resample --provenance'");
+        throw InputError(path.string(), name,
+                         "is missing: this was not written by 'mirrorfield resample --provenance'");
       return found->value();
     };
     Provenance p;

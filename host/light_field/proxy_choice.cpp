@@ -35,12 +35,11 @@ Surroundings given_box(const RoomBox& box, const PlaneRectangle& rectangle) {
 
 Surroundings given_mesh(const std::string& file, const PlaneRectangle& rectangle) {
   auto mesh = std::make_shared<const RayScene>(read_mesh(file));
-  Surroundings s = mesh_surroundings(centre_of(rectangle), std::move(mesh),
-                                     std::filesystem::path(file).filename().string());
+  Surroundings s =
+      mesh_surroundings(centre_of(rectangle), std::move(mesh), std::filesystem::path(file).filename().string());
   const auto& distances = s.inverse_distance.data;
   if (std::all_of(distances.begin(), distances.end(), [](float inverse) { return inverse <= 0; }))
-    throw InputError(file, "",
-                     "is not seen from the plane: it must surround it, in world coordinates, metres, Z-up");
+    throw InputError(file, "", "is not seen from the plane: it must surround it, in world coordinates, metres, Z-up");
   return s;
 }
 

@@ -23,8 +23,9 @@ struct ProxyChoice {
   std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
 };
 
-// The surroundings that a proxy's name asks for; see docs/light_field.md, "Focus". Throws InputError: a mesh that cannot
-// be read or that nothing on the plane can see, a box that does not hold the rectangle. A team shares the work. Precondition: no proxy_fault.
+// The surroundings that a proxy's name asks for; see docs/light_field.md, "Focus". Throws InputError: a mesh that
+// cannot be read or that nothing on the plane can see, a box that does not hold the rectangle. A team shares the work.
+// Precondition: no proxy_fault.
 [[nodiscard]] ProxyChoice choose_proxy(const std::vector<FieldView>&, const PlaneRectangle&, const std::string& proxy,
                                        int k, std::span<const Emitter>, const Team&);
 

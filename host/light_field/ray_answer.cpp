@@ -52,7 +52,7 @@ float visibility(const Surroundings& surroundings, const Eigen::Vector3f& p, con
   // Inverse distances from there: of X, and of what the proxy puts first on that ray.
   const float expected = x.w() / (x.head<3>() - x.w() * passes).norm();
   const float met = surroundings.inverse_distance_along(passes, r);
-  constexpr float tolerance = 0.1F;   // of the inverse distance: two neighbouring rays of one slanted wall
+  constexpr float tolerance = 0.1F;       // of the inverse distance: two neighbouring rays of one slanted wall
   constexpr float least_inverse = 0.05F;  // 1/metres: what is beyond 20 m all lies together
   const float nearer = (met - expected) / (tolerance * (expected + least_inverse));
   return std::clamp(2 - nearer, 0.0F, 1.0F);
@@ -60,9 +60,9 @@ float visibility(const Surroundings& surroundings, const Eigen::Vector3f& p, con
 
 RayAnswer answer_of(std::span<const FieldView> views, const Surroundings& surroundings, const WantedRay& ray,
                     const AnswerOptions& options) {
-  const float inverse =
-      surroundings.is_plane() ? 0.0F : surroundings.inverse_distance_along(ray.p, ray.direction);
-  const ProxyPoint x = surroundings.is_plane() ? ProxyPoint(ray.p.homogeneous()) : proxy_point(ray.p, ray.direction, inverse);
+  const float inverse = surroundings.is_plane() ? 0.0F : surroundings.inverse_distance_along(ray.p, ray.direction);
+  const ProxyPoint x =
+      surroundings.is_plane() ? ProxyPoint(ray.p.homogeneous()) : proxy_point(ray.p, ray.direction, inverse);
   std::vector<Answering> answering;
   std::vector<ViewPenalty> ranked;
   for (std::uint32_t i = 0; i < views.size(); ++i) {
@@ -74,7 +74,8 @@ RayAnswer answer_of(std::span<const FieldView> views, const Surroundings& surrou
   }
   std::vector<ViewWeight> weights(static_cast<std::size_t>(options.penalty.k));
   weights.resize(blend_weights(ranked, options.penalty.k, equal_rays, weights));
-  std::sort(weights.begin(), weights.end(), [](const ViewWeight& a, const ViewWeight& b) { return a.weight > b.weight; });
+  std::sort(weights.begin(), weights.end(),
+            [](const ViewWeight& a, const ViewWeight& b) { return a.weight > b.weight; });
   RayAnswer result;
   for (const ViewWeight& w : weights) {
     const Answering& a = answering[w.view];

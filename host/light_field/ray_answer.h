@@ -32,13 +32,13 @@ struct SpeakingView {
 
 struct RayAnswer {
   Eigen::Vector3f radiance = Eigen::Vector3f::Zero();
-  float confidence = 0;  // as in LightField
+  float confidence = 0;                // as in LightField
   std::vector<SpeakingView> speaking;  // heaviest first
 };
 
-// How much of the proxy point X a view can see past the proxy itself, for a ray at p: 1 all, 0 none, softly between. The
-// view's ray is followed from where it passes p. A proxy seen from behind its own front hides what lies behind: a leaf's
-// edge, a corner.
+// How much of the proxy point X a view can see past the proxy itself, for a ray at p: 1 all, 0 none, softly between.
+// The view's ray is followed from where it passes p. A proxy seen from behind its own front hides what lies behind: a
+// leaf's edge, a corner.
 [[nodiscard]] float visibility(const Surroundings&, const Eigen::Vector3f& p, const ProxyPoint& x,
                                const Eigen::Vector3f& view_centre);
 

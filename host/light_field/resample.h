@@ -28,7 +28,8 @@ struct ResampleOptions {
   std::string proxy = "auto";
   int k = 0;  // views blended for a ray; 0: 15 for the plane (the paper's), 6 else; 1 to 64
   // Buehler's penalty (host/blending/ray_penalty.h): β in metres of ray distance per octave of missing resolution, ≥ 0;
-  // γ > 0, how strongly views are shunned near their border. α, the unit of both, is 1. The plane has no choice of them.
+  // γ > 0, how strongly views are shunned near their border. α, the unit of both, is 1. The plane has no choice of
+  // them.
   double resolution = 0;
   double border = 1;
   bool fill = true;         // give texels that no view saw a guess, at confidence 0; else they stay black
@@ -44,8 +45,8 @@ struct ResampleResult {
   std::vector<SphereScore> sphere_scores;  // only when a sphere was chosen
   std::map<std::string, double> seconds;   // by stage; blending and packing: of all threads, over their number
   std::size_t views = 0;
-  double mean_confidence = 0;  // cosine-weighted over directions, mean over the plane
-  double filled_share = 0;     // of the texels: those that no view saw, if they were given a guess
+  double mean_confidence = 0;            // cosine-weighted over directions, mean over the plane
+  double filled_share = 0;               // of the texels: those that no view saw, if they were given a guess
   std::optional<Provenance> provenance;  // when asked for
 };
 

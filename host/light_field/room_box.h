@@ -9,8 +9,8 @@
 
 namespace mf {
 
-// A room: four walls along the world's axes and a ceiling, metres. A side at infinity is no wall. It has no floor: light
-// from below the plane is not in the field.
+// A room: four walls along the world's axes and a ceiling, metres. A side at infinity is no wall. It has no floor:
+// light from below the plane is not in the field.
 struct RoomBox {
   static constexpr float none = std::numeric_limits<float>::infinity();
 

@@ -19,15 +19,15 @@ class RayScene;
 //
 // A star-shaped surface about `centre`: for each direction of the upper hemisphere the inverse distance to what is seen
 // there, 1/metres (0: so far that no view sees parallax), on an equal-area map. A single value is a sphere. An empty
-// map stands for the paper's proxy, the light-field plane itself. Of a room or a mesh the map is a picture, for those who
-// read the file; rays meet the shape itself.
+// map stands for the paper's proxy, the light-field plane itself. Of a room or a mesh the map is a picture, for those
+// who read the file; rays meet the shape itself.
 struct Surroundings {
   Eigen::Vector3f centre_in_world = Eigen::Vector3f::Zero();
   ImageF inverse_distance;  // one channel; Lambert's equal-area map (equal_area_square)
   std::optional<RoomBox> box;
   std::shared_ptr<const RayScene> mesh;  // shared: copies of a field look at the same triangles. Not in the file
   std::string mesh_file;                 // its name, without folders; in the file
-  ImageF confidence;        // same size, 0…1: how clearly the distance was found; empty for a given sphere
+  ImageF confidence;  // same size, 0…1: how clearly the distance was found; empty for a given sphere
 
   // Colour of the surroundings as seen from the centre, finer than the field's directions can hold: RGB + weight, the
   // upper half of a lat-long map (row 0 at the zenith, column 0 at azimuth 0, counter-clockwise); empty when there is
@@ -37,8 +37,8 @@ struct Surroundings {
   [[nodiscard]] bool is_plane() const { return inverse_distance.empty(); }
 
   // 1 / distance from p to where the ray from p towards `direction` (world, unit) meets the surface; 0 when distant.
-  // The nearest crossing beyond 0.2 m counts (of a mesh: beyond 2 cm, either side of a triangle; a ray that meets none is
-  // distant). Precondition: not the plane; p is nearer to the centre than the surface is.
+  // The nearest crossing beyond 0.2 m counts (of a mesh: beyond 2 cm, either side of a triangle; a ray that meets none
+  // is distant). Precondition: not the plane; p is nearer to the centre than the surface is.
   [[nodiscard]] float inverse_distance_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
 
   // Inverse distance from the centre; bilinear. A direction below the horizon takes the horizon's value.

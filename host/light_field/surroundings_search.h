@@ -25,8 +25,8 @@ struct SphereScore {
 [[nodiscard]] std::vector<SphereScore> score_spheres(const std::vector<FieldView>& views, const PlaneRectangle&, int k);
 
 // A distance per direction: for each the one at which the views agree best. Where the surroundings are featureless any
-// distance serves. Directions about an emitter get the emitter's distance: it matters most, and a leaf before it hides it
-// best.
+// distance serves. Directions about an emitter get the emitter's distance: it matters most, and a leaf before it hides
+// it best.
 [[nodiscard]] Surroundings find_surroundings(const DistanceSweep&, std::span<const Emitter>);
 
 }  // namespace mf

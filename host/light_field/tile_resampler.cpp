@@ -301,10 +301,13 @@ bool TileResampler::near_emitter(int bx, int by) const {
 
 // Mean over the cell's parts of colour · weight, and of weight. Parts beside an emitter of which no view speaks (each
 // shows its glare there) are as those that are known, never as the emitter itself.
-Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p, float part_angle) const {
+Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p) const {
+  const std::vector<CellSample>& parts =
+      emitters_.may_meet(p, cell_.direction, cell_.angle_rad) ? cell_.fine_parts : cell_.parts;
+  const float part_angle = cell_.angle_rad / std::sqrt(static_cast<float>(parts.size()));
   Eigen::Vector4f on_emitter = Eigen::Vector4f::Zero(), beside = Eigen::Vector4f::Zero();
   float solid_angle = 0, all_beside = 0, unknown_beside = 0;
-  for (const CellSample& part : cell_.fine_parts) {
+  for (const CellSample& part : parts) {
     const Eigen::Vector4f seen = emitters_.radiance(p, part.direction, part_angle, candidate_views_);
     const Eigen::Vector4f weighted = part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
     solid_angle += part.solid_angle_sr;
@@ -324,12 +327,10 @@ Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p, float
 // Each part of the cell is blended by itself, at the block's vertices; texels are interpolated.
 void TileResampler::blend_near_emitter(int bx, int by, Lanes3& colour, Lanes& confidence) {
   Patch<Eigen::Vector4f> mean;
-  const float part_angle = cell_.angle_rad / std::sqrt(static_cast<float>(cell_.fine_parts.size()));
   for (std::size_t i = 0; i < mean.size(); ++i)
     mean[i] = mean_near_emitter(vertex(bx * block_vertices + static_cast<int>(i % patch_side),
                                        by * block_vertices + static_cast<int>(i / patch_side))
-                                    .p,
-                                part_angle);
+                                    .p);
   Lanes4 sum;
   interpolate(mean, sum);
   confidence = sum.w;

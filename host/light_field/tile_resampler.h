@@ -66,7 +66,7 @@ class TileResampler {
   [[nodiscard]] Eigen::Vector4f fetch_cell(const FieldView&, const Vertex&) const;
 
   [[nodiscard]] bool near_emitter(int block_x, int block_y) const;
-  [[nodiscard]] Eigen::Vector4f mean_near_emitter(const Eigen::Vector3f& p, float part_angle) const;
+  [[nodiscard]] Eigen::Vector4f mean_near_emitter(const Eigen::Vector3f& p) const;
   void blend_near_emitter(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
 
   // The octaves by which a view sees the cell too coarsely; 0 when they do not count.

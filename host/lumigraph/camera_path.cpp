@@ -52,12 +52,13 @@ std::vector<View> interpolated(const std::vector<View>& keys, int frames) {
     const double t = at - i;
     View view = keys[static_cast<std::size_t>(i)];
     const auto& next = keys[static_cast<std::size_t>(i) + 1].camera.parameters;
-    for (std::size_t p = 0; p < next.size(); ++p) view.camera.parameters[p] += t * (next[p] - view.camera.parameters[p]);
-    const Eigen::Vector4d q = catmull_rom<Eigen::Vector4d>(knot(i - 1).rotation, knot(i).rotation,
-                                                           knot(i + 1).rotation, knot(i + 2).rotation, t);
-    const Rigid3 world_from_cam{Eigen::Quaterniond(q).normalized(),
-                                catmull_rom<Eigen::Vector3d>(knot(i - 1).centre, knot(i).centre, knot(i + 1).centre,
-                                                             knot(i + 2).centre, t)};
+    for (std::size_t p = 0; p < next.size(); ++p)
+      view.camera.parameters[p] += t * (next[p] - view.camera.parameters[p]);
+    const Eigen::Vector4d q = catmull_rom<Eigen::Vector4d>(knot(i - 1).rotation, knot(i).rotation, knot(i + 1).rotation,
+                                                           knot(i + 2).rotation, t);
+    const Rigid3 world_from_cam{
+        Eigen::Quaterniond(q).normalized(),
+        catmull_rom<Eigen::Vector3d>(knot(i - 1).centre, knot(i).centre, knot(i + 1).centre, knot(i + 2).centre, t)};
     view.cam_from_world = world_from_cam.inverse();
     views.push_back(view);
   }

@@ -24,10 +24,10 @@ ImageF luma_of(const Picture& picture, float largest) {
       [&](const auto& image) {
         ImageF luma(image.width, image.height, 1);
         for (std::size_t i = 0; i < luma.data.size(); ++i)
-          luma.data[i] = (0.2126F * static_cast<float>(image.data[3 * i]) +
-                          0.7152F * static_cast<float>(image.data[3 * i + 1]) +
-                          0.0722F * static_cast<float>(image.data[3 * i + 2])) /
-                         largest;
+          luma.data[i] =
+              (0.2126F * static_cast<float>(image.data[3 * i]) + 0.7152F * static_cast<float>(image.data[3 * i + 1]) +
+               0.0722F * static_cast<float>(image.data[3 * i + 2])) /
+              largest;
         return luma;
       },
       picture);
@@ -65,8 +65,7 @@ std::uint32_t nearest_to(const std::vector<Lumigraph::Source>& sources, std::siz
   const auto centre = [&](std::size_t i) { return sources[i].cam_from_world.inverse().translation; };
   std::size_t nearest = left_out == 0 ? 1 : 0;
   for (std::size_t i = 0; i < sources.size(); ++i)
-    if (i != left_out &&
-        (centre(i) - centre(left_out)).norm() < (centre(nearest) - centre(left_out)).norm())
+    if (i != left_out && (centre(i) - centre(left_out)).norm() < (centre(nearest) - centre(left_out)).norm())
       nearest = i;
   return static_cast<std::uint32_t>(nearest);
 }
@@ -152,7 +151,8 @@ LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const
     leave_to_mask(set.photos[i].mask, by_nearest.covered);
     const Picture& photo = set.photos[i].picture;
     const double pixels = static_cast<double>(foretold.covered.data.size());
-    const auto covered = std::count_if(foretold.covered.data.begin(), foretold.covered.data.end(), [](auto v) { return v == Covered::seen; });
+    const auto covered = std::count_if(foretold.covered.data.begin(), foretold.covered.data.end(),
+                                       [](auto v) { return v == Covered::seen; });
     const LeftOutView of_view{sources[i].name, psnr_db(foretold.picture, photo, foretold.covered),
                               ssim(foretold.picture, photo, foretold.covered),
                               psnr_db(by_nearest.picture, photo, by_nearest.covered),

@@ -56,16 +56,14 @@ inline __attribute__((always_inline)) void blend(const ChosenViews& chosen, Imag
 __attribute__((target_clones("arch=x86-64-v3", "default"))) void blend_photos(
     const ChosenViews& chosen, const std::vector<PhotoPyramid<std::uint8_t>>& photos, ImageU8& picture,
     ImageU8& covered) {
-  blend(chosen, picture, covered, [&photos](std::uint32_t view, float x, float y, float lod) {
-    return photos[view].sample(x, y, lod);
-  });
+  blend(chosen, picture, covered,
+        [&photos](std::uint32_t view, float x, float y, float lod) { return photos[view].sample(x, y, lod); });
 }
 
 void blend_photos(const ChosenViews& chosen, const std::vector<PhotoPyramid<float>>& photos, ImageF& picture,
                   ImageU8& covered) {
-  blend(chosen, picture, covered, [&photos](std::uint32_t view, float x, float y, float lod) {
-    return photos[view].sample(x, y, lod);
-  });
+  blend(chosen, picture, covered,
+        [&photos](std::uint32_t view, float x, float y, float lod) { return photos[view].sample(x, y, lod); });
 }
 
 void blend_colours(const ChosenViews& chosen, ImageU8& picture, ImageU8& covered) {
@@ -111,7 +109,8 @@ Lumigraph::Lumigraph(Lumigraph&&) noexcept = default;
 Lumigraph::~Lumigraph() = default;
 
 void Lumigraph::set_proxy(Proxy proxy, const Progress& progress) {
-  std::visit([this]<typename T>(T&& other) { proxy_.emplace<std::remove_cvref_t<T>>(std::forward<T>(other)); }, std::move(proxy));
+  std::visit([this]<typename T>(T&& other) { proxy_.emplace<std::remove_cvref_t<T>>(std::forward<T>(other)); },
+             std::move(proxy));
   look_at_proxy(progress);
 }
 
@@ -122,7 +121,8 @@ void Lumigraph::look_at_proxy(const Progress& progress) {
   tbb::parallel_for(std::size_t{0}, sources_.size(), [&](std::size_t i) {
     sights_[i] = make_sight(sources_[i].camera, sources_[i].cam_from_world, masks_[i], proxy_, visibility_);
     const std::lock_guard lock(mutex);
-    report_progress(progress, "looking at the proxy", static_cast<double>(++done) / static_cast<double>(sources_.size()));
+    report_progress(progress, "looking at the proxy",
+                    static_cast<double>(++done) / static_cast<double>(sources_.size()));
   });
 }
 
@@ -155,8 +155,7 @@ CandidateViews Lumigraph::speaking(std::span<const std::uint32_t> views) const {
 LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& options,
                                    std::span<const std::uint32_t> views) const {
   check(!options.validate(), "the lumigraph's options are valid");
-  const std::vector<AnsweringView> answering =
-      views_from(view.cam_from_world.inverse().translation, options);
+  const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
   const CandidateViews may_speak = speaking(views);
   const TileFrame frame{view, proxy_, options, visibility_.tolerance, answering, may_speak};
   const int width = view.camera.width;
@@ -164,15 +163,16 @@ LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& opt
   LumigraphPicture result{ImageU8(), ImageU8(width, height, 1)};
   if (options.shown == Shown::blending_field) {
     ImageU8 picture(width, height, 3);
-    render_tiles(frame, [&](const ChosenViews& chosen) { blend_colours(chosen, picture, result.covered); }, *pool_);
+    render_tiles(
+        frame, [&](const ChosenViews& chosen) { blend_colours(chosen, picture, result.covered); }, *pool_);
     result.picture = std::move(picture);
     return result;
   }
   std::visit(
       [&]<typename T>(const std::vector<PhotoPyramid<T>>& photos) {
         Image<T> picture(width, height, 3);
-        render_tiles(frame, [&](const ChosenViews& chosen) { blend_photos(chosen, photos, picture, result.covered); },
-                     *pool_);
+        render_tiles(
+            frame, [&](const ChosenViews& chosen) { blend_photos(chosen, photos, picture, result.covered); }, *pool_);
         result.picture = std::move(picture);
       },
       pyramids_);
@@ -187,8 +187,7 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
   one.camera.width = one.camera.height = 1;
   one.camera.parameters[2] -= pixel.x() - 0.5;
   one.camera.parameters[3] -= pixel.y() - 0.5;
-  const std::vector<AnsweringView> answering =
-      views_from(view.cam_from_world.inverse().translation, options);
+  const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
   const CandidateViews may_speak = speaking(views);
   std::vector<ViewWeight> weights;
   const TakeChosen take = [&](const ChosenViews& chosen) {

@@ -30,9 +30,10 @@ enum class Shown { photos, blending_field };
 
 struct LumigraphOptions {
   PenaltyOptions penalty{4, 1, 0.1F, 0.5F};  // angle: of the chord at the proxy point, radians
-  float border = 0.03F;    // 0.001 to 0.5 of a photo's shorter side: width of its soft border
+  float border = 0.03F;                      // 0.001 to 0.5 of a photo's shorter side: width of its soft border
   Shown shown = Shown::photos;
-  std::optional<Moment> moment{};  // of a scene that moves; nothing: times are not looked at. Photos without one always speak
+  std::optional<Moment>
+      moment{};  // of a scene that moves; nothing: times are not looked at. Photos without one always speak
 
   // What is wrong, in words that name the field; nothing when all is well.
   [[nodiscard]] std::optional<std::string> validate() const;

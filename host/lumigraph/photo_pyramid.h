@@ -59,7 +59,8 @@ class PhotoPyramid {
     std::vector<T> texels;  // four a pixel
 
     [[nodiscard]] const T* texel(int x, int y) const {
-      return texels.data() + 4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+      return texels.data() +
+             4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
     }
     [[nodiscard]] Float4 at(int x, int y) const { return load_four(texel(x, y)); }
   };

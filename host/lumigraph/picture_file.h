@@ -7,8 +7,8 @@
 
 namespace mf {
 
-// Three channels of a JPEG, PNG or TIFF as 8-bit codes (16-bit ones are rounded to 8, grey is repeated), or of an EXR or
-// a float TIFF as linear floats. Throws InputError naming the file.
+// Three channels of a JPEG, PNG or TIFF as 8-bit codes (16-bit ones are rounded to 8, grey is repeated), or of an EXR
+// or a float TIFF as linear floats. Throws InputError naming the file.
 [[nodiscard]] Picture read_picture(const std::filesystem::path&);
 
 // One channel, 8 bits: the first of the file's.

@@ -38,9 +38,9 @@ void check_photo(const PosedPhoto& photo, const std::string& source) {
         std::find_if(linear->data.begin(), linear->data.end(), [](float value) { return !std::isfinite(value); });
     if (bad != linear->data.end()) {
       const auto pixel = static_cast<int>((bad - linear->data.begin()) / 3);
-      throw InputError(source, photo.name,
-                       fmt::format("holds NaN or infinity at pixel ({}, {}): repair the picture", pixel % width,
-                                   pixel / width));
+      throw InputError(
+          source, photo.name,
+          fmt::format("holds NaN or infinity at pixel ({}, {}): repair the picture", pixel % width, pixel / width));
     }
   }
 }

@@ -25,8 +25,6 @@ namespace fs = std::filesystem;
 
 constexpr float no_end = std::numeric_limits<float>::infinity();
 
-
-
 std::vector<double> numbers_in(const std::string& name, std::string_view text) {
   std::vector<double> numbers;
   while (!text.empty()) {
@@ -72,8 +70,8 @@ Eigen::Vector3d convergence(const PhotoSet& set, const MeanSight& sight) {
     a += across;
     b += across * centre_of(photo);
   }
-  // Parallel axes leave the distance open: the least eigenvalue, n · (mean square sine to the common direction), is then
-  // that of a jitter of 0.3°.
+  // Parallel axes leave the distance open: the least eigenvalue, n · (mean square sine to the common direction), is
+  // then that of a jitter of 0.3°.
   const double along = sight.direction.dot(a * sight.direction) / static_cast<double>(set.photos.size());
   const auto solution = solve_symmetric(a, b);
   const Eigen::Vector3d x = solution ? Eigen::Vector3d(*solution) : sight.centre;
@@ -110,7 +108,8 @@ Proxy make_sphere(const std::string& name, const std::vector<double>& numbers, c
 // Points are rarely all right: a box leaves out the outermost hundredth on each side.
 BoxProxy box_of_points(const PhotoSet& set) {
   if (set.points.size() < 8)
-    throw InputError(set.source, "--proxy box", "needs the scene's points (points3D.txt): or give box:x0,y0,z0,x1,y1,z1");
+    throw InputError(set.source, "--proxy box",
+                     "needs the scene's points (points3D.txt): or give box:x0,y0,z0,x1,y1,z1");
   BoxProxy box;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<float> sorted;
@@ -133,7 +132,8 @@ Proxy make_box(const std::string& name, const std::vector<double>& numbers, cons
   BoxProxy box;
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<std::size_t>(axis);
-    if (!(numbers[i] < numbers[i + 3])) throw InputError("--proxy", name, "has a first corner that is not the lower one");
+    if (!(numbers[i] < numbers[i + 3]))
+      throw InputError("--proxy", name, "has a first corner that is not the lower one");
     box.low[axis] = static_cast<float>(numbers[i]);
     box.high[axis] = static_cast<float>(numbers[i + 3]);
   }
@@ -144,10 +144,12 @@ Proxy make_box(const std::string& name, const std::vector<double>& numbers, cons
 Proxy make_tunnel(const std::string& name, const std::vector<double>& numbers, const PhotoSet& set) {
   const bool right = numbers.size() == 2 || numbers.size() == 3;
   if (!right || !std::all_of(numbers.begin(), numbers.end(), [](double n) { return n > 0; }))
-    throw InputError("--proxy", name, "takes a width and a height, and a distance of its end if it has one: tunnel:W,H,D");
+    throw InputError("--proxy", name,
+                     "takes a width and a height, and a distance of its end if it has one: tunnel:W,H,D");
   const MeanSight sight = mean_sight(set);
   Eigen::Vector3d down = Eigen::Vector3d::Zero();
-  for (const PosedPhoto& photo : set.photos) down += photo.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
+  for (const PosedPhoto& photo : set.photos)
+    down += photo.cam_from_world.rotation.conjugate() * Eigen::Vector3d::UnitY();
   Eigen::Matrix3d box_from_world;
   box_from_world.row(2) = sight.direction.transpose();
   const Eigen::Vector3d across = down.cross(sight.direction).normalized();
@@ -169,7 +171,8 @@ Proxy make_hull(const std::string& name, const std::vector<double>& numbers, con
   HullOptions options;
   if (!numbers.empty()) options.resolution = static_cast<int>(std::clamp(numbers[0], 0.0, 1e6));
   if (numbers.size() == 7)
-    options.box = {Eigen::Vector3d(numbers[1], numbers[2], numbers[3]), Eigen::Vector3d(numbers[4], numbers[5], numbers[6])};
+    options.box = {Eigen::Vector3d(numbers[1], numbers[2], numbers[3]),
+                   Eigen::Vector3d(numbers[4], numbers[5], numbers[6])};
   if (const auto wrong = options.validate()) throw InputError("--proxy", name, *wrong);
   return MeshProxy(visual_hull(set, options));
 }
@@ -190,7 +193,8 @@ Proxy make_mesh(const std::string& name, const fs::path& folder) {
 std::vector<double> read_npy_doubles(const fs::path& path, std::size_t count) {
   const std::string bytes = read_file_bytes(path);
   constexpr std::size_t preamble = 10;
-  const InputError wrong(path.string(), "", fmt::format("is no NumPy array of {} doubles: save it with numpy.save", count));
+  const InputError wrong(path.string(), "",
+                         fmt::format("is no NumPy array of {} doubles: save it with numpy.save", count));
   if (bytes.size() < preamble || !bytes.starts_with("\x93NUMPY\x01")) throw wrong;
   const std::size_t header =
       static_cast<unsigned char>(bytes[8]) + 256U * static_cast<unsigned char>(bytes[9]) + preamble;
@@ -212,7 +216,8 @@ MeanSight mean_sight(const PhotoSet& set) {
   }
   // A mean vector this short is what directions all around leave: no plane faces them.
   if (!(mean.direction.norm() > 0.3))
-    throw InputError(set.source, "--proxy", "no one plane or tunnel faces photos that look all around: give sphere:R, box or a mesh");
+    throw InputError(set.source, "--proxy",
+                     "no one plane or tunnel faces photos that look all around: give sphere:R, box or a mesh");
   mean.direction.normalize();
   return mean;
 }
@@ -227,8 +232,7 @@ TriangleMesh moved_by_similarity(TriangleMesh mesh, const fs::path& npy) {
       r.norm() > 0 ? Eigen::AngleAxisd(-r.norm(), r.normalized()).toRotationMatrix() : Eigen::Matrix3d::Identity();
   if (!back.allFinite() || !t.allFinite() || !c.allFinite() || !(scale > 0) || !std::isfinite(scale))
     throw InputError(npy.string(), "", "holds numbers that are not finite: make it again, or take it away");
-  for (Eigen::Vector3f& p : mesh.positions)
-    p = (back * (p.cast<double>() - c - t) / scale + c).cast<float>();
+  for (Eigen::Vector3f& p : mesh.positions) p = (back * (p.cast<double>() - c - t) / scale + c).cast<float>();
   for (Eigen::Vector3f& n : mesh.normals) n = back.cast<float>() * n;
   return mesh;
 }
@@ -250,7 +254,8 @@ Proxy make_proxy(const std::string& name, const PhotoSet& set, const fs::path& f
 std::string describe(const Proxy& proxy) {
   struct Describer {
     std::string operator()(const PlaneProxy& p) const {
-      return fmt::format("plane ({:.4g}, {:.4g}, {:.4g}) · x = {:.6g}", p.normal.x(), p.normal.y(), p.normal.z(), p.offset);
+      return fmt::format("plane ({:.4g}, {:.4g}, {:.4g}) · x = {:.6g}", p.normal.x(), p.normal.y(), p.normal.z(),
+                         p.offset);
     }
     std::string operator()(const SphereProxy& s) const {
       return fmt::format("sphere of radius {:.6g} about ({:.4g}, {:.4g}, {:.4g})", s.radius, s.centre.x(), s.centre.y(),

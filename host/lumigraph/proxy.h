@@ -48,7 +48,8 @@ struct MeshProxy {
 using Proxy = std::variant<PlaneProxy, SphereProxy, BoxProxy, MeshProxy>;
 
 // A proxy as users name it, for a set of photos:
-//   plane               faces the mean direction of sight, at the average 1/z of the scene: of the set's points, else of
+//   plane               faces the mean direction of sight, at the average 1/z of the scene: of the set's points, else
+//   of
 //                       the point where the optical axes converge
 //   plane:D             the same at distance D (> 0) before the mean of the photos' centres
 //   sphere:R            radius R about the mean of the centres

@@ -35,7 +35,8 @@ void trace_surface(const SphereProxy& sphere, const ProxyRays& rays) {
     const float discriminant = b * b - a * c;
     const float distance = discriminant >= 0 ? (-b + std::sqrt(discriminant)) / a : -1;
     rays.distance[i] = distance > 0 ? distance : no_hit;
-    const Eigen::Vector3f n = distance > 0 ? Eigen::Vector3f((o + distance * d) / sphere.radius) : Eigen::Vector3f::UnitZ();
+    const Eigen::Vector3f n =
+        distance > 0 ? Eigen::Vector3f((o + distance * d) / sphere.radius) : Eigen::Vector3f::UnitZ();
     rays.nx[i] = n.x();
     rays.ny[i] = n.y();
     rays.nz[i] = n.z();
@@ -130,8 +131,8 @@ void trace_packet(const MeshProxy& proxy, const ProxyRays& rays, std::size_t fir
   if (proxy.inside) cross_entrances(proxy, rays.origin, valid, hit);
   for (std::size_t i = 0; i < count; ++i) {
     const bool met = hit.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-    const Eigen::Vector3f n = met ? shading_normal(proxy.mesh, hit.hit.primID[i], hit.hit.u[i], hit.hit.v[i])
-                                  : Eigen::Vector3f::UnitZ();
+    const Eigen::Vector3f n =
+        met ? shading_normal(proxy.mesh, hit.hit.primID[i], hit.hit.u[i], hit.hit.v[i]) : Eigen::Vector3f::UnitZ();
     rays.distance[first + i] = met ? hit.ray.tfar[i] : no_hit;
     rays.nx[first + i] = n.x();
     rays.ny[first + i] = n.y();

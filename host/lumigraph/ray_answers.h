@@ -19,7 +19,7 @@ inline constexpr float edge_on_cosine = 0.05F;
 
 // Rays of the new view and the proxy points that they meet, by coordinate. A ray's direction has length 1 along the new
 // view's optical axis, so that `depth` is both its length's factor and the point's depth:  X = E + depth · d.
-struct RayBundle {  // at most largest_bundle rays
+struct RayBundle {                    // at most largest_bundle rays
   std::span<const float> dx, dy, dz;  // world
   std::span<const float> depth;       // finite
   std::span<const float> nx, ny, nz;  // the proxy's normal at X, unit length, either side
@@ -46,8 +46,8 @@ struct AnsweringView {
   std::array<float, 3> eye_in_cam{};       // E in the photo's frame
   std::array<float, 3> eye_from_centre{};  // E − C, world
   float per_border_px = 1;                 // 1 / width of the soft border
-  float time_penalty = 0;                  // ≥ 0, before it is divided by the weight: taken at another time, see Moment
-  const SourceSight* sight = nullptr;      // none: the photo shows whatever lies in its picture
+  float time_penalty = 0;              // ≥ 0, before it is divided by the weight: taken at another time, see Moment
+  const SourceSight* sight = nullptr;  // none: the photo shows whatever lies in its picture
 };
 
 // `border` is the soft border's width as a fraction of the photo's shorter side.
@@ -84,7 +84,7 @@ struct RaysRegion {
 
 // The k + 1 least penalties of each ray, in rising order, and which candidate has them. One ray a column.
 struct LeastPenalties {
-  std::span<float> penalty;         // (k + 1) rows
+  std::span<float> penalty;           // (k + 1) rows
   std::span<std::int32_t> candidate;  // (k + 1) rows; −1: none
   std::size_t rays = 0;
   int k = 1;

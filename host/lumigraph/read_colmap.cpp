@@ -60,9 +60,10 @@ const std::array<ColmapModel, 5>& colmap_models() {
 const ColmapModel& find_model(const ColmapLines& lines, std::string_view name) {
   for (const ColmapModel& model : colmap_models())
     if (model.name == name) return model;
-  lines.fail(fmt::format("{} is a camera model that is not read: undistort the photos (colmap image_undistorter), or "
-                         "estimate SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV",
-                         name));
+  lines.fail(
+      fmt::format("{} is a camera model that is not read: undistort the photos (colmap image_undistorter), or "
+                  "estimate SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL or OPENCV",
+                  name));
 }
 
 std::map<int, CameraModel> read_cameras(const fs::path& path) {

@@ -15,9 +15,9 @@ namespace mf {
 // the principal point is taken to be the picture's centre.
 [[nodiscard]] PhotoSet read_colmap(const std::filesystem::path& folder);
 
-// transforms.json of nerfstudio and instant-ngp: frames with file_path and transform_matrix (world_from_camera, x right,
-// y up, looking along −z); fl_x, fl_y, cx, cy, w, h or camera_angle_x, and k1 k2 k3 p1 p2, of all frames or of each;
-// mask_path and time of a frame where given. A file_path without an extension names a .png, .jpg or .exr.
+// transforms.json of nerfstudio and instant-ngp: frames with file_path and transform_matrix (world_from_camera, x
+// right, y up, looking along −z); fl_x, fl_y, cx, cy, w, h or camera_angle_x, and k1 k2 k3 p1 p2, of all frames or of
+// each; mask_path and time of a frame where given. A file_path without an extension names a .png, .jpg or .exr.
 [[nodiscard]] PhotoSet read_transforms(const std::filesystem::path& file);
 
 // Both throw InputError naming the file, the line or field, and what to do.

@@ -122,8 +122,8 @@ PhotoSet read_transforms(const fs::path& path) {
   read_pictures(files, set.photos);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     PosedPhoto& photo = set.photos[i];
-    photo.camera = camera_of({frames[i], all, file}, width_of(photo.picture), height_of(photo.picture), file,
-                             photo.name);
+    photo.camera =
+        camera_of({frames[i], all, file}, width_of(photo.picture), height_of(photo.picture), file, photo.name);
   }
   check_photos(set);
   return set;

@@ -14,8 +14,8 @@ namespace mf {
 struct VisibilityOptions {
   float tolerance = 0.01F;  // of the depth, 0.0001 to 1: a point this far behind the surface that a photo sees begins
                             // to be hidden, and is hidden at twice as much
-  float silhouette = 8;  // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
-                         // inexact proxy puts colours of the foreground on the background
+  float silhouette = 8;     // photo pixels, 0 to 64: a photo is not trusted this near to a jump of its depth, where an
+                            // inexact proxy puts colours of the foreground on the background
 
   [[nodiscard]] std::optional<std::string> validate() const;
 };

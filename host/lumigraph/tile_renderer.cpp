@@ -14,10 +14,10 @@ namespace mf {
 namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-constexpr int block_side = 16;         // pixels: photos are ranked for 256 rays at a time
-constexpr std::size_t samples = 16;    // rays that stand for a tile when its bound is guessed
-constexpr float bound_slack = 1.03F;   // on the guess: fewer rays are ranked twice
-constexpr float same_ray = 1e-6F;      // radians: what single precision leaves of an angle of 0
+constexpr int block_side = 16;        // pixels: photos are ranked for 256 rays at a time
+constexpr std::size_t samples = 16;   // rays that stand for a tile when its bound is guessed
+constexpr float bound_slack = 1.03F;  // on the guess: fewer rays are ranked twice
+constexpr float same_ray = 1e-6F;     // radians: what single precision leaves of an angle of 0
 
 // The points of some rays: one region, or two where a silhouette parts them into near and far ones, so that neither is
 // much larger than its part of the picture.
@@ -94,8 +94,8 @@ TileRenderer::TileRenderer(const TileFrame& frame, TileBuffers& buffers, const T
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   buffers.least_penalty.resize(entries);
   buffers.least_candidate.resize(entries);
-  for (auto* values : {&buffers.chosen_weight, &buffers.chosen_sight, &buffers.chosen_x, &buffers.chosen_y,
-                       &buffers.chosen_lod})
+  for (auto* values :
+       {&buffers.chosen_weight, &buffers.chosen_sight, &buffers.chosen_x, &buffers.chosen_y, &buffers.chosen_lod})
     values->resize(entries);
   buffers.chosen_view.resize(entries);
   buffers.pixel.resize(largest_bundle);
@@ -179,8 +179,7 @@ void TileRenderer::rank_for_tile() {
   CandidateViews& of_tile = buffers_.of_tile;
   bound_from_below(rays, {0, rays.size()}, frame_.speaking, infinite, of_tile);
   rank(picked.bundle(0, samples, focal2_), of_tile);
-  const auto worst =
-      worst_of({buffers_.least_penalty, buffers_.least_candidate, samples, frame_.options.penalty.k});
+  const auto worst = worst_of({buffers_.least_penalty, buffers_.least_candidate, samples, frame_.options.penalty.k});
   of_tile.bound = bound_slack * *std::max_element(worst.begin(), worst.end());
 }
 

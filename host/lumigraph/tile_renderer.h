@@ -53,15 +53,15 @@ struct TileFrame {
   const View& view;
   const Proxy& proxy;
   const LumigraphOptions& options;
-  float depth_tolerance = 0;                // see VisibilityOptions
-  std::span<const AnsweringView> views;     // every photo, for this frame's eye
-  const CandidateViews& speaking;           // those that may speak, bounds 0 and infinite
+  float depth_tolerance = 0;             // see VisibilityOptions
+  std::span<const AnsweringView> views;  // every photo, for this frame's eye
+  const CandidateViews& speaking;        // those that may speak, bounds 0 and infinite
 };
 
 // The memory that a thread renders tiles with. It is worth keeping from frame to frame.
 struct TileBuffers {
-  TileRays rays;         // of the tile, block by block
-  TileRays some;         // samples of a region, or rays that are ranked again
+  TileRays rays;                                  // of the tile, block by block
+  TileRays some;                                  // samples of a region, or rays that are ranked again
   std::vector<float> x, y, lod, weight, penalty;  // answers, a row a candidate
   std::vector<float> least_penalty;               // see LeastPenalties
   std::vector<std::int32_t> least_candidate;
@@ -82,10 +82,10 @@ class TilePool {
 
 // Chooses the photos for the pixels of a tile.
 //
-// For the tile, and then for each block of it, photos are put in the order of the least penalty that any of its rays can
-// give them; rays are ranked in that order until no photo that is left can be among any ray's k + 1 best. Blocks look
-// only at photos up to the tile's bound, which some rays of it guess; a ray whose (k + 1)-th best is above the bound is
-// ranked again, up to that. So every ray gets what ranking all photos would have given it.
+// For the tile, and then for each block of it, photos are put in the order of the least penalty that any of its rays
+// can give them; rays are ranked in that order until no photo that is left can be among any ray's k + 1 best. Blocks
+// look only at photos up to the tile's bound, which some rays of it guess; a ray whose (k + 1)-th best is above the
+// bound is ranked again, up to that. So every ray gets what ranking all photos would have given it.
 class TileRenderer {
  public:
   TileRenderer(const TileFrame&, TileBuffers&, const TakeChosen&);

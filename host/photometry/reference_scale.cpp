@@ -151,7 +151,8 @@ std::vector<double> disc_means(const Disc& disc, const Frame& frame, const Image
       noise[c] = cell_noise(wide, cells, static_cast<int>(c));
       next.push_back(plane_at_centre(wide, cells, static_cast<int>(c), noise[c]));
     }
-    if (!std::all_of(estimates.begin(), estimates.end(), [&](const auto& earlier) { return agree(earlier, next); })) break;
+    if (!std::all_of(estimates.begin(), estimates.end(), [&](const auto& earlier) { return agree(earlier, next); }))
+      break;
     estimates.push_back(std::move(next));
   }
   std::vector<double> means;
@@ -175,7 +176,8 @@ std::vector<double> reference_scale(const SessionHeader::Reference& reference, c
   const Disc disc = disc_in(reference, linear.width, linear.height, session);
   require_unsaturated(disc, frame, curve.saturation_code, session);
   std::vector<double> scale;
-  const std::vector<double> means = disc_means(disc, frame, picture, bin_cells(linear, format.layout), curve.saturation_code);
+  const std::vector<double> means =
+      disc_means(disc, frame, picture, bin_cells(linear, format.layout), curve.saturation_code);
   for (std::size_t c = 0; c < channels; ++c) {
     if (!(means[c] > 0))
       throw InputError(session, "reference",

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "host/tracing/ray_scene.h"
-#include "host/render/surface_point.h"
 #include "host/io/view.h"
+#include "host/render/surface_point.h"
+#include "host/tracing/ray_scene.h"
 
 namespace mf {
 

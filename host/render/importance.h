@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "host/io/mesh.h"
 #include "host/light_field/light_field.h"
 #include "host/light_field/light_tiles.h"
-#include "host/io/mesh.h"
 
 namespace mf {
 

@@ -7,8 +7,8 @@
 
 #include "common/progress.h"
 #include "host/render/light_set.h"
-#include "host/tracing/ray_scene.h"
 #include "host/render/surface_point.h"
+#include "host/tracing/ray_scene.h"
 
 namespace mf {
 

@@ -7,8 +7,8 @@
 
 #include "common/progress.h"
 #include "host/gl/egl_context.h"
-#include "host/render/irradiance.h"
 #include "host/io/mesh.h"
+#include "host/render/irradiance.h"
 
 namespace mf {
 

@@ -62,14 +62,14 @@ std::string scale(double nearest_m, int size_px) {
     constexpr double closest = 0.09;  // of the width: labels nearer than that would touch
     if (share < last + closest || share > 1 - closest / 2) return;
     last = share;
-    fmt::format_to(std::back_inserter(svg), R"(<text x="{:.1f}" y="{}" class="{}">{}</text>)", share * across, bar_top + 28,
-                   share <= 0 ? "start" : "middle", text);
+    fmt::format_to(std::back_inserter(svg), R"(<text x="{:.1f}" y="{}" class="{}">{}</text>)", share * across,
+                   bar_top + 28, share <= 0 ? "start" : "middle", text);
   };
   label(0, "far");
   for (const double metres : {16.0, 8.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.2, 1.0, 0.8, 0.6, 0.5, 0.4, 0.3, 0.2})
     label(nearest_m / metres, fmt::format("{:.2g}", metres));
-  fmt::format_to(std::back_inserter(svg), R"(<text x="{:.1f}" y="{}" class="end">{:.2g} m</text>)", across, bar_top + 28,
-                 nearest_m);
+  fmt::format_to(std::back_inserter(svg), R"(<text x="{:.1f}" y="{}" class="end">{:.2g} m</text>)", across,
+                 bar_top + 28, nearest_m);
   return svg;
 }
 
@@ -108,8 +108,7 @@ DistanceDisc draw_distances(const LightField& field, int size_px) {
 
 std::string distance_figure(const LightField& field, int size_px) {
   const DistanceDisc disc = draw_distances(field, size_px);
-  std::string svg =
-      fmt::format(R"(<image width="{0}" height="{0}" href="{1}"/>)", size_px, png_data_uri(disc.colours));
+  std::string svg = fmt::format(R"(<image width="{0}" height="{0}" href="{1}"/>)", size_px, png_data_uri(disc.colours));
   const Eigen::Matrix3f plane_from_world =
       field.plane.world_from_plane.rotation.toRotationMatrix().transpose().cast<float>();
   for (std::size_t i = 0; i < field.emitters.size(); ++i) {
@@ -117,9 +116,10 @@ std::string distance_figure(const LightField& field, int size_px) {
     const Eigen::Vector3f to = plane_from_world * (e.position - field.surroundings.centre_in_world);
     const Eigen::Vector2f at = static_cast<float>(size_px) * equal_area_square(to.normalized());
     const float radius = std::max(6.0F, 0.5F * static_cast<float>(size_px) * e.radius_m / to.norm());
-    fmt::format_to(std::back_inserter(svg),
-                   R"(<circle class="emitter" cx="{0:.1f}" cy="{1:.1f}" r="{2:.1f}"/><text class="emitter" x="{3:.1f}" y="{1:.1f}">{4}</text>)",
-                   at.x(), at.y(), radius, at.x() + radius + 3, i + 1);
+    fmt::format_to(
+        std::back_inserter(svg),
+        R"(<circle class="emitter" cx="{0:.1f}" cy="{1:.1f}" r="{2:.1f}"/><text class="emitter" x="{3:.1f}" y="{1:.1f}">{4}</text>)",
+        at.x(), at.y(), radius, at.x() + radius + 3, i + 1);
   }
   svg += scale(disc.nearest_m, size_px);
   return fmt::format(R"(<svg viewBox="0 0 {} {}" role="img" aria-label="distances">{}</svg>)", size_px, size_px + 46,

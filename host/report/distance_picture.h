@@ -11,8 +11,8 @@ namespace mf {
 // What the light comes from, as the plane's middle sees it: the proxy's distance by direction in false colours, near
 // yellow, far violet, evenly in inverse distance. Drawn as draw_hemisphere() does.
 struct DistanceDisc {
-  ImageU8 colours;        // three channels; white outside the disc, greyer where the distance is less sure
-  double nearest_m = 0;   // the distance that yellow stands for; violet is infinity
+  ImageU8 colours;       // three channels; white outside the disc, greyer where the distance is less sure
+  double nearest_m = 0;  // the distance that yellow stands for; violet is infinity
 };
 // Precondition: the field has surroundings (not the plane proxy).
 [[nodiscard]] DistanceDisc draw_distances(const LightField&, int size_px);

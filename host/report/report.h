@@ -29,8 +29,8 @@ struct ReportInput {
 
 // One self-contained HTML page, UTF-8: pictures are inlined, nothing is fetched, no script. Reads on a phone and on a
 // desktop. It shows sample frames with the mirror's opening, the response, the error of every frame, which directions
-// were seen, how far what the light comes from is, the probe, the irradiance over the plane, and every frame that was not used with the reason.
-// Throws InputError when a frame of the session cannot be read.
+// were seen, how far what the light comes from is, the probe, the irradiance over the plane, and every frame that was
+// not used with the reason. Throws InputError when a frame of the session cannot be read.
 [[nodiscard]] std::string report_html(const ReportInput&, const Progress&);
 
 }  // namespace mf

@@ -2,8 +2,8 @@
 //
 // What each proxy is worth on the path-traced desk capture: one session, the same poses and response, the same errors
 // against truth; both back ends on the same composite; and previews straight from the session. The capture must lie
-// beside the checkout. `plane` is the baseline: the paper's way (Ihrke et al. 2008). And how little the light depends on
-// the number of directions. A calibrated session of the capture may be named after the flags; else it is made first.
+// beside the checkout. `plane` is the baseline: the paper's way (Ihrke et al. 2008). And how little the light depends
+// on the number of directions. A calibrated session of the capture may be named after the flags; else it is made first.
 #include <benchmark/benchmark.h>
 
 #include <chrono>
@@ -46,10 +46,9 @@ class Desk {
   [[nodiscard]] std::string field(const std::string& proxy, int directions = 2500, int size = 128) {
     std::string file = folder_ / (proxy + std::to_string(directions) + "x" + std::to_string(size) + ".lf.exr");
     if (fs::exists(file)) return file;
-    const bool made =
-        mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions", std::to_string(directions),
-                     "--size", std::to_string(size), "--proxy", proxy})
-            .exit_code == 0;
+    const bool made = mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions",
+                                   std::to_string(directions), "--size", std::to_string(size), "--proxy", proxy})
+                          .exit_code == 0;
     return made ? file : std::string();
   }
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the blending's parameters and the proxies are worth, without any truth but the capture itself: each of some views
-// is left out, and what it saw is predicted from all others. Prints tables; the defaults of ResampleOptions come from
-// them.
+// What the blending's parameters and the proxies are worth, without any truth but the capture itself: each of some
+// views is left out, and what it saw is predicted from all others. Prints tables; the defaults of ResampleOptions come
+// from them.
 //
 //   bench_leave_one_out [SESSION]      a calibrated session; without one the path-traced desk capture is imported
 //
 // A left-out view's pixel is a ray: from its virtual centre, wanted at the point p where it crosses the light-field
 // plane. The others answer as they do for a texel of the field. The error is that of log2 luminance over a footprint of
-// 0.9° (a part of a cell at 2500 directions) or 0.25° (the panorama's), noise of the left-out pixel included. Proxies are
-// searched without the left-out views. Rays near emitters are left out: the field does not blend those (docs/
+// 0.9° (a part of a cell at 2500 directions) or 0.25° (the panorama's), noise of the left-out pixel included. Proxies
+// are searched without the left-out views. Rays near emitters are left out: the field does not blend those (docs/
 // light_field.md, "Emitters").
 //
 // The real mirror: five photos of a board in five poses of one mirror (shared/data/mirror_board). The board is the
@@ -104,7 +104,8 @@ void print_row(const std::string& name, const Score& part, const Score& detail) 
 
 void print_head(const std::string& title) {
   fmt::print(
-      "\n{}\n| | 0.9°: median, stop | RMS | PSNR, dB | 0.25°: median | RMS | PSNR | answered |\n|---|---|---|---|---|---|---|---|\n",
+      "\n{}\n| | 0.9°: median, stop | RMS | PSNR, dB | 0.25°: median | RMS | PSNR | answered "
+      "|\n|---|---|---|---|---|---|---|---|\n",
       title);
 }
 
@@ -154,7 +155,8 @@ struct Experiment {
   const std::vector<FieldView>& views;
   std::vector<LeftOutRay> part, detail;
 
-  void row(const std::string& name, const Surroundings& s, const PenaltyOptions& penalty, bool visibility = false) const {
+  void row(const std::string& name, const Surroundings& s, const PenaltyOptions& penalty,
+           bool visibility = false) const {
     print_row(name, score_of(views, s, part, penalty, visibility), score_of(views, s, detail, penalty, visibility));
   }
 };
@@ -188,11 +190,12 @@ void mirror_capture(const fs::path& folder) {
   print_head("Proxies, k = 6 (plane 15)");
   e.row("plane", {}, {15, 1, 0, 1});
   for (const std::string proxy : {"sphere:inf", "sphere", "box", "auto"}) {
-    const ProxyChoice choice = choose_proxy(others, *rectangle, proxy, usual.k, emitters);
+    const ProxyChoice choice = choose_proxy(others, *rectangle, proxy, usual.k, emitters, Team());
     e.row(proxy == "auto" ? proxy : surroundings_name(choice.surroundings), choice.surroundings, usual);
     if (proxy == "auto") vary_blending(e, "auto", choice.surroundings);
     if (proxy == "auto")
-      e.row("auto, regularized", find_surroundings(regularized(sweep_surroundings(others, *rectangle)), emitters), usual);
+      e.row("auto, regularized", find_surroundings(regularized(sweep_surroundings(others, *rectangle)), emitters),
+            usual);
     if (proxy == "sphere:inf") vary_blending(e, "distant sphere", choice.surroundings);
   }
 }
@@ -230,24 +233,18 @@ std::optional<FieldView> board_view(const fs::path& folder, int number, const Ei
   view.pixel_from_world = (k * pose).cast<float>();
   view.centre_in_world = (-pose.leftCols<3>().inverse() * pose.col(3)).cast<float>();
   view.focal_px = static_cast<float>(k(0, 0));
-  view.levels.emplace_back(photo.cols, photo.rows);
+  std::vector<Eigen::Vector4f> texels(static_cast<std::size_t>(photo.rows) * static_cast<std::size_t>(photo.cols));
   for (int y = 0; y < photo.rows; ++y)
     for (int x = 0; x < photo.cols; ++x) {
       const cv::Vec3b bgr = photo.at<cv::Vec3b>(y, x);
       const auto linear = [](unsigned char code) { return std::pow(static_cast<float>(code) / 255, 2.2F); };
       const float edge = static_cast<float>(std::min({x, y, photo.cols - 1 - x, photo.rows - 1 - y})) / 24;
       const float a = std::clamp(edge, 0.0F, 1.0F);
-      view.levels[0].at(x, y) << a * Eigen::Vector3f(linear(bgr[2]), linear(bgr[1]), linear(bgr[0])), a;
+      texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(photo.cols) + static_cast<std::size_t>(x)]
+          << a * Eigen::Vector3f(linear(bgr[2]), linear(bgr[1]), linear(bgr[0])),
+          a;
     }
-  while (view.levels.back().width() > 2) {
-    const PremultipliedImage& in = view.levels.back();
-    PremultipliedImage half((in.width() + 1) / 2, (in.height() + 1) / 2);
-    for (int y = 0; y < half.height(); ++y)
-      for (int x = 0; x < half.width(); ++x)
-        half.at(x, y) = 0.25F * (in.at(2 * x, 2 * y) + in.at(2 * x + 1, 2 * y) + in.at(2 * x, 2 * y + 1) +
-                                 in.at(2 * x + 1, 2 * y + 1));
-    view.levels.push_back(std::move(half));
-  }
+  view.levels = make_levels(photo.cols, photo.rows, texels);
   return view;
 }
 
@@ -264,8 +261,8 @@ std::vector<LeftOutRay> board_rays(std::vector<FieldView>& views, const Eigen::V
       const WantedRay ray{views[v].centre_in_world, to.normalized(), patch_m / to.norm()};
       const ProxyPoint point = proxy_point(ray.p, ray.direction, 1 / to.norm());
       const Eigen::Vector3f pixel = pixel_of(views[v], point);
-      const Eigen::Vector4f seen = views[v].fetch(level_for_angle(views[v], point, ray.angle_rad),
-                                                  pixel.x() / pixel.z(), pixel.y() / pixel.z());
+      const Eigen::Vector4f seen =
+          views[v].fetch(level_for_angle(views[v], point, ray.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
       if (pixel.z() > 0 && seen.w() > 0.9F) own.push_back({v, ray, log2_luminance(seen.head<3>() / seen.w())});
     }
     if (own.empty()) continue;
@@ -308,12 +305,15 @@ void real_mirror(const fs::path& folder) {
   print_head("A real mirror, from k = 4, γ = 1");
   for (const int count : {1, 2, 3, 4}) e.row(fmt::format("k {}", count), s, {count, 1, 0, 1});
   for (const float border : {0.5F, 2.0F}) e.row(fmt::format("γ {}", border), s, {4, 1, 0, border});
-  for (const float resolution : {0.01F, 0.1F}) e.row(fmt::format("β {} m an octave", resolution), s, {4, 1, resolution, 1});
+  for (const float resolution : {0.01F, 0.1F})
+    e.row(fmt::format("β {} m an octave", resolution), s, {4, 1, resolution, 1});
 }
 
 #else
 
-void real_mirror(const fs::path&) { fmt::print("\nthe real mirror's photos need OpenCV's imgcodecs, which is not installed\n"); }
+void real_mirror(const fs::path&) {
+  fmt::print("\nthe real mirror's photos need OpenCV's imgcodecs, which is not installed\n");
+}
 
 #endif
 

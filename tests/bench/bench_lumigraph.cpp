@@ -183,9 +183,9 @@ void hallway_by_vertices(benchmark::State& state) {
   const LumigraphOptions options = with_resolution(100);
   measure(state, [&](const View& view) {
     const Hallway& hall = hallway();
-    return bench::render_by_vertices({hall.lumigraph->sources(), hall.photos, hall.walls, hall.edges,
-                                      static_cast<int>(state.range(0))},
-                                     view, options);
+    return bench::render_by_vertices(
+        {hall.lumigraph->sources(), hall.photos, hall.walls, hall.edges, static_cast<int>(state.range(0))}, view,
+        options);
   });
 }
 BENCHMARK(hallway_by_vertices)

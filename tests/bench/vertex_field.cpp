@@ -21,7 +21,7 @@ namespace {
 
 struct Vertex {
   Eigen::Vector2d pixel;
-  float depth = 0;                 // of the proxy; infinite: not there
+  float depth = 0;  // of the proxy; infinite: not there
   std::vector<ViewWeight> weights;
 };
 
@@ -31,8 +31,8 @@ class VertexWeights {
   VertexWeights(const VertexField& field, const View& view, const LumigraphOptions& options)
       : field_(field), view_(view), options_(options), eye_(view.cam_from_world.inverse().translation) {
     for (const Lumigraph::Source& source : field.sources)
-      answering_.push_back(answering_view(answering_camera(source.camera), source.cam_from_world, {}, eye_,
-                                          options.border));
+      answering_.push_back(
+          answering_view(answering_camera(source.camera), source.cam_from_world, {}, eye_, options.border));
   }
 
   void operator()(std::span<Vertex> vertices) const {
@@ -49,8 +49,8 @@ class VertexWeights {
       vertices[i].depth = row[3][i];
       if (!std::isfinite(row[3][i])) row[3][i] = 1;  // such vertices are not drawn
     }
-    const RayBundle bundle{part(0), part(1), part(2), part(3), part(4), part(5), part(6),
-                           static_cast<float>(view_.camera.fx() * view_.camera.fy())};
+    const RayBundle bundle{part(0), part(1), part(2), part(3),
+                           part(4), part(5), part(6), static_cast<float>(view_.camera.fx() * view_.camera.fy())};
     std::vector<std::vector<ViewPenalty>> candidates(count);
     std::array<float, largest_bundle> weight;
     std::array<float, largest_bundle> worst;
@@ -193,8 +193,7 @@ void draw(const VertexField& field, const View& view, const std::array<const Ver
   if (std::abs(corner_rows.determinant()) < 1e-9) return;
   const Eigen::Matrix3d inverse = corner_rows.inverse();
   const auto linear = [&](auto value) {
-    const Eigen::Vector3d c =
-        inverse * Eigen::Vector3d(value(*corners[0]), value(*corners[1]), value(*corners[2]));
+    const Eigen::Vector3d c = inverse * Eigen::Vector3d(value(*corners[0]), value(*corners[1]), value(*corners[2]));
     return Linear{c[0], c[1], c[2]};
   };
   const Linear inverse_depth = linear([](const Vertex& v) { return 1.0 / v.depth; });
@@ -229,10 +228,9 @@ void draw(const VertexField& field, const View& view, const std::array<const Ver
       for (int x = std::max(0, static_cast<int>(std::ceil(from - 0.5))); x <= x1; ++x) {
         const double w = weight(x + 0.5, y + 0.5);
         if (!(w > 0)) continue;
-        const Eigen::Vector3d h =
-            turn * Eigen::Vector3d(x + 0.5, y + 0.5, 1) + inverse_depth(x + 0.5, y + 0.5) * shift;
-        const Float4 colour = field.photos[speaker].sample(static_cast<float>(h.x() / h.z()),
-                                                           static_cast<float>(h.y() / h.z()), 0);
+        const Eigen::Vector3d h = turn * Eigen::Vector3d(x + 0.5, y + 0.5, 1) + inverse_depth(x + 0.5, y + 0.5) * shift;
+        const Float4 colour =
+            field.photos[speaker].sample(static_cast<float>(h.x() / h.z()), static_cast<float>(h.y() / h.z()), 0);
         for (int c = 0; c < 3; ++c) sum.at(x, y, c) += static_cast<float>(w) * colour[c];
       }
     }

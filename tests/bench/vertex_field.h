@@ -8,10 +8,10 @@
 
 namespace mf::bench {
 
-// The renderer of Buehler et al. 2001, §4.2–4.3, to compare with: the blending field is evaluated at a grid's points, at the
-// photos' projected centres and at the ends of the proxy's edges; these are triangulated (Delaunay; an edge of the proxy
-// that the triangulation does not hold gets points until it does), and every triangle is drawn once for each photo that
-// speaks at one of its corners, with projective texture and weights that are linear over the picture.
+// The renderer of Buehler et al. 2001, §4.2–4.3, to compare with: the blending field is evaluated at a grid's points,
+// at the photos' projected centres and at the ends of the proxy's edges; these are triangulated (Delaunay; an edge of
+// the proxy that the triangulation does not hold gets points until it does), and every triangle is drawn once for each
+// photo that speaks at one of its corners, with projective texture and weights that are linear over the picture.
 struct VertexField {
   struct Edge {
     Eigen::Vector3d from, to;  // world

@@ -27,8 +27,7 @@ const Names stage_libraries = vocabulary + Names{"TBB"};
 // The plain structs that stages hand forward.
 const Names records{"host/calibration/calibration.h", "host/light_field/light_field.h",
                     "host/light_field/direction_set.h", "host/light_field/light_tiles.h"};
-const Names stage_headers =
-    Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/", "host/team/"};
+const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/", "host/team/"};
 
 bool starts_with_any(std::string_view text, const Names& beginnings) {
   return std::any_of(beginnings.begin(), beginnings.end(), [&](std::string_view b) { return text.starts_with(b); });
@@ -40,9 +39,9 @@ bool contains(const Names& names, std::string_view name) {
 
 // The C++ standard library has no dots in its names; of POSIX and Linux, these folders and these files.
 bool is_system_header(std::string_view header) {
-  static const Names posix{"sys/",      "netinet/", "arpa/",     "net/",    "dlfcn.h",  "malloc.h", "unistd.h",
-                           "fcntl.h",   "poll.h",   "pthread.h", "netdb.h", "signal.h", "dirent.h", "termios.h",
-                           "endian.h",  "ifaddrs.h", "grp.h",    "spawn.h"};
+  static const Names posix{"sys/",     "netinet/",  "arpa/",    "net/",      "dlfcn.h", "malloc.h",
+                           "unistd.h", "fcntl.h",   "poll.h",   "pthread.h", "netdb.h", "signal.h",
+                           "dirent.h", "termios.h", "endian.h", "ifaddrs.h", "grp.h",   "spawn.h"};
   return header.find('.') == std::string_view::npos || starts_with_any(header, posix);
 }
 
@@ -142,7 +141,8 @@ const std::vector<FolderRule>& include_table() {
       {"host/render/", stage_headers + records, stage_libraries + Names{"GL", "Embree"}},
       // A composite is two renderings and a plate.
       {"host/composite/", stage_headers + records + Names{"host/render/"}, stage_libraries},
-      {"host/lumigraph/", stage_headers + Names{"host/calibration/calibration.h"}, stage_libraries + Names{"GL", "Embree"}},
+      {"host/lumigraph/", stage_headers + Names{"host/calibration/calibration.h"},
+       stage_libraries + Names{"GL", "Embree"}},
       {"host/report/", stage_headers + records, stage_libraries},
       // It shows what two stages give, and lets a hand ask them for more.
       {"host/viewer/",

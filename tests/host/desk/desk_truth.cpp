@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "host/io/exr.h"
-#include "host/render/light_set.h"
 #include "host/io/view.h"
+#include "host/render/light_set.h"
 
 namespace mf::test {
 

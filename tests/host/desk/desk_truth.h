@@ -22,8 +22,8 @@ struct ProbeError {
 
 // Between the lamp's centre and that of the field's nearest emitter, metres; infinite when the field has none.
 //
-// No file states where the lamp is. With the true poses all bright rays of the frames, reflected, pass within 4.5 cm (its
-// stated radius) of (0.50, 0.32, 0.85); the point from which they stray least lies 0.2 mm from there.
+// No file states where the lamp is. With the true poses all bright rays of the frames, reflected, pass within 4.5 cm
+// (its stated radius) of (0.50, 0.32, 0.85); the point from which they stray least lies 0.2 mm from there.
 [[nodiscard]] double lamp_error_m(const LightField&);
 
 // The light field's irradiance on the table against plate 0 on the board's white squares, whose albedo is known.

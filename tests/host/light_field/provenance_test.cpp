@@ -64,7 +64,8 @@ TEST(Provenance, TellsWhoLitTheTexels) {
           }
           // The block's middle lies between four texels.
           Eigen::Vector4f texel = Eigen::Vector4f::Zero();
-          for (int t = 0; t < 4; ++t) texel += 0.25F * r.field.tile(i)[(16 * by + 7 + t / 2) * 32 + 16 * bx + 7 + t % 2];
+          for (int t = 0; t < 4; ++t)
+            texel += 0.25F * r.field.tile(i)[(16 * by + 7 + t / 2) * 32 + 16 * bx + 7 + t % 2];
           if (texel.w() < 0.9F) continue;
           ASSERT_NEAR(sum, 1, 1e-4);
           // Tiles average a view's weight over the cell's parts: near borders the shares differ a little.

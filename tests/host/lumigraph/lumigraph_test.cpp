@@ -83,16 +83,17 @@ std::map<std::uint32_t, double> reference_weights(const std::vector<View>& views
     if (!((view.cam_from_world * x).z() > 0)) continue;
     const Eigen::Vector2d pixel = view.camera.project(view.cam_from_world * x);
     const auto ramp = [&](double at, int size) {
-      const double t = std::clamp(std::min(at, size - at) / (static_cast<double>(o.border) * std::min(view.camera.width, view.camera.height)),
-                                  0.0, 1.0);
+      const double t = std::clamp(
+          std::min(at, size - at) / (static_cast<double>(o.border) * std::min(view.camera.width, view.camera.height)),
+          0.0, 1.0);
       return t * t * (3 - 2 * t);
     };
     const double weight = ramp(pixel.x(), view.camera.width) * ramp(pixel.y(), view.camera.height);
     if (!(weight > 0)) continue;
     const double chord = ((x - view.cam_from_world.inverse().translation).normalized() - along).norm();
     const double octaves = std::max(0.0, 0.5 * std::log2(area(wanted) / area(view)));
-    penalties.emplace_back((o.penalty.angle * chord + o.penalty.resolution * octaves) / std::pow(weight, o.penalty.border),
-                           i);
+    penalties.emplace_back(
+        (o.penalty.angle * chord + o.penalty.resolution * octaves) / std::pow(weight, o.penalty.border), i);
   }
   std::sort(penalties.begin(), penalties.end());
   const auto k = static_cast<std::size_t>(o.penalty.k);
@@ -186,8 +187,8 @@ TEST(Lumigraph, HiddenPointsGetNoForeground) {
   EXPECT_GT(floor, 5000);
 }
 
-// In the manner of the paper's hallway: photos from far behind on the axis, whose rays deviate least where the corridor is
-// far, and photos from beside the new view, which saw it finely.
+// In the manner of the paper's hallway: photos from far behind on the axis, whose rays deviate least where the corridor
+// is far, and photos from beside the new view, which saw it finely.
 TEST(Lumigraph, AHallwayIsDrawnFromThePhotosThatSawItFinely) {
   BoxProxy hall;
   hall.low = {-1, -1, -9};
@@ -219,8 +220,7 @@ TEST(Lumigraph, AMaskedPhotoSaysNothingThere) {
   }
   set.photos[0].mask = ImageU8(64, 64, 1, 0);
   const Lumigraph lumigraph(set, plane);
-  const LumigraphPicture picture =
-      lumigraph.render({set.photos[0].camera, set.photos[0].cam_from_world}, {});
+  const LumigraphPicture picture = lumigraph.render({set.photos[0].camera, set.photos[0].cam_from_world}, {});
   const auto& codes = std::get<ImageU8>(picture.picture);
   EXPECT_EQ(codes.at(32, 32, 0), 200);
 }

@@ -93,8 +93,9 @@ std::vector<View> cap_of_views(int count, double radius, double cap_deg, const C
     const double angle = i * pi * (3 - std::sqrt(5.0));
     const double height = 1 - (1 - std::cos(cap_deg * pi / 180)) * (i + 0.5) / count;
     const double across = std::sqrt(1 - height * height);
-    views.push_back({camera, looking(radius * Eigen::Vector3d(across * std::cos(angle), across * std::sin(angle), height),
-                                     Eigen::Vector3d::Zero())});
+    views.push_back(
+        {camera, looking(radius * Eigen::Vector3d(across * std::cos(angle), across * std::sin(angle), height),
+                         Eigen::Vector3d::Zero())});
   }
   return views;
 }

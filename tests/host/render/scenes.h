@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "host/light_field/light_field.h"
 #include "host/io/mesh.h"
+#include "host/light_field/light_field.h"
 #include "host/render/surface_point.h"
 
 namespace mf::test {
