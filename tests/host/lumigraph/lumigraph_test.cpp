@@ -88,7 +88,7 @@ std::map<std::uint32_t, double> reference_weights(const std::vector<View>& views
           0.0, 1.0);
       return t * t * (3 - 2 * t);
     };
-    const double weight = ramp(pixel.x(), view.camera.width) * ramp(pixel.y(), view.camera.height);
+    const double weight = std::pow(ramp(pixel.x(), view.camera.width) * ramp(pixel.y(), view.camera.height), 2);
     if (!(weight > 0)) continue;
     const double chord = ((x - view.cam_from_world.inverse().translation).normalized() - along).norm();
     const double octaves = std::max(0.0, 0.5 * std::log2(area(wanted) / area(view)));
