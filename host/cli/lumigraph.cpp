@@ -84,8 +84,7 @@ PhotoSet read_photos(const LumigraphArguments& a) {
                      "needs photos: give one of --colmap FOLDER, --transforms FILE and --session FOLDER");
   if (!(a.scale > 0 && a.scale <= 1)) throw InputError("lumigraph", "--scale", "must be above 0 and at most 1");
   if (!a.session.empty()) return read_session_photos(a.session, a.scale, a.scene, progress_bar());
-  PhotoSet set = a.colmap.empty() ? read_transforms(a.transforms) : read_colmap(a.colmap);
-  if (set.photos.size() < 2) throw InputError(set.source, "", "holds one photo only: nothing can be interpolated");
+  PhotoSet set = read_posed_photos(a.colmap, a.transforms);
   if (a.mask_below) mask_dark_background(set, static_cast<float>(*a.mask_below));
   return scaled(std::move(set), a.scale);
 }
@@ -100,12 +99,6 @@ Proxy proxy_of(const LumigraphArguments& a, const PhotoSet& set) {
     throw InputError("lumigraph", "--save-proxy", "saves a mesh: give --proxy hull, or a session's auto");
   write_obj(a.save_proxy, mesh->mesh);
   return proxy;
-}
-
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw InputError(folder.string(), "", "is no folder that can be made: " + error.message());
 }
 
 // |a − b| around mid-grey for codes; plain difference for linear pictures.

@@ -68,11 +68,8 @@ void view_session(const ViewArguments& a) {
 
 void view_photos(const ViewArguments& a) {
   if (!(a.scale > 0 && a.scale <= 1)) throw InputError("view", "--scale", "must be above 0 and at most 1");
-  const bool colmap = !a.colmap.empty();
-  const PhotoSet set = scaled(colmap ? read_colmap(a.colmap) : read_transforms(a.transforms), a.scale);
-  if (set.photos.size() < 2)
-    throw InputError(set.source, "", "holds one photo only: there is nothing to see from between");
-  Proxy proxy = make_proxy(a.proxy, set, colmap ? a.colmap : a.transforms.parent_path());
+  const PhotoSet set = scaled(read_posed_photos(a.colmap, a.transforms), a.scale);
+  Proxy proxy = make_proxy(a.proxy, set, a.colmap.empty() ? a.transforms.parent_path() : a.colmap);
   const std::string title = fmt::format("{}: {} photos, proxy {}", set.source, set.photos.size(), describe(proxy));
   LumigraphView view(Lumigraph(set, std::move(proxy), {}, progress_bar()));
   Window window = open_window(a, set.source);

@@ -123,8 +123,7 @@ MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes>
   }
   Lanes inverse_threshold, sum{};
   for (std::size_t i = 0; i < block_lanes; ++i) {
-    const float next = least[kept - 1].v[i];
-    inverse_threshold.v[i] = 1 / (std::min(next, largest) + floor) * (next < infinity ? 1.0F : 0.0F);
+    inverse_threshold.v[i] = 1 / (least[kept - 1].v[i] + floor);  // 0 where there is no (k + 1)-th view
     confidence.v[i] = 0;
   }
   const Lanes& last = least[kept - 2];

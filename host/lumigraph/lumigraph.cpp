@@ -182,11 +182,7 @@ LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& opt
 std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vector2d& pixel,
                                               const LumigraphOptions& options,
                                               std::span<const std::uint32_t> views) const {
-  // The view of that one pixel: its principal point moves so that (0.5, 0.5) is the position.
-  View one = view;
-  one.camera.width = one.camera.height = 1;
-  one.camera.parameters[2] -= pixel.x() - 0.5;
-  one.camera.parameters[3] -= pixel.y() - 0.5;
+  const View one = pixel_of_view(view, pixel);
   const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
   const CandidateViews may_speak = speaking(views);
   std::vector<ViewWeight> weights;
@@ -214,6 +210,15 @@ std::optional<Eigen::Vector3d> Lumigraph::point_at(const View& view, const Eigen
                  o.subspan(0, 1), o.subspan(1, 1), o.subspan(2, 1), o.subspan(3, 1)});
   if (!std::isfinite(out[0])) return std::nullopt;
   return world_from_cam.translation + static_cast<double>(out[0]) * d;
+}
+
+// The principal point moves so that (0.5, 0.5) is the position.
+View pixel_of_view(const View& view, const Eigen::Vector2d& pixel) {
+  View one = view;
+  one.camera.width = one.camera.height = 1;
+  one.camera.parameters[2] -= pixel.x() - 0.5;
+  one.camera.parameters[3] -= pixel.y() - 0.5;
+  return one;
 }
 
 std::array<std::uint8_t, 3> field_colour(std::uint32_t view) {

@@ -103,6 +103,9 @@ class Lumigraph {
   std::unique_ptr<TilePool> pool_;  // memory that frames take over from each other
 };
 
+// Of one pixel alone: what `view` shows around a pixel position, as a picture of 1 × 1.
+[[nodiscard]] View pixel_of_view(const View&, const Eigen::Vector2d& pixel);
+
 // The colour of a photo in the blending field: neighbours in number are far apart in hue.
 [[nodiscard]] std::array<std::uint8_t, 3> field_colour(std::uint32_t view);
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "common/error.h"
 #include "common/file_bytes.h"
 #include "host/io/exr.h"
 #include "host/io/image_file.h"
@@ -80,6 +81,12 @@ void read_pictures(const std::vector<PhotoFiles>& files, std::vector<PosedPhoto>
     photos[i].picture = read_picture(files[i].picture);
     photos[i].mask = files[i].mask.empty() ? read_alpha(files[i].picture) : read_mask(files[i].mask);
   });
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError(folder.string(), "", "is no folder that can be made: " + error.message());
 }
 
 }  // namespace mf

@@ -20,6 +20,10 @@ namespace mf {
 // each; mask_path and time of a frame where given. A file_path without an extension names a .png, .jpg or .exr.
 [[nodiscard]] PhotoSet read_transforms(const std::filesystem::path& file);
 
-// Both throw InputError naming the file, the line or field, and what to do.
+// One of the two, the other path being empty: photos to see from between, so at least two.
+[[nodiscard]] PhotoSet read_posed_photos(const std::filesystem::path& colmap_folder,
+                                         const std::filesystem::path& transforms_file);
+
+// All throw InputError naming the file, the line or field, and what to do.
 
 }  // namespace mf

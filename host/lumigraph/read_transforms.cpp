@@ -129,4 +129,10 @@ PhotoSet read_transforms(const fs::path& path) {
   return set;
 }
 
+PhotoSet read_posed_photos(const std::filesystem::path& colmap_folder, const std::filesystem::path& transforms_file) {
+  PhotoSet set = colmap_folder.empty() ? read_transforms(transforms_file) : read_colmap(colmap_folder);
+  if (set.photos.size() < 2) throw InputError(set.source, "", "holds one photo only: nothing can be interpolated");
+  return set;
+}
+
 }  // namespace mf

@@ -111,12 +111,6 @@ std::array<int, 2> counts_from_json(const json& layout, const char* key, const s
   return {v[0], v[1]};
 }
 
-void make_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw InputError(folder.string(), "", "is no folder that can be made: " + error.message());
-}
-
 // Of a frame in transforms.json: the pose with OpenGL's axes (x right, y up, z back), and the principal point.
 json frame_entry(const View& view, const std::string& picture) {
   const Rigid3 cam_from_gl{Eigen::Quaterniond(0, 1, 0, 0), Eigen::Vector3d::Zero()};  // half a turn about x

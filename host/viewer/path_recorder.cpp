@@ -14,16 +14,11 @@
 #include "common/json_file.h"
 #include "host/io/image_file.h"
 #include "host/lumigraph/camera_path.h"
+#include "host/lumigraph/picture_file.h"
 
 namespace mf {
 
 namespace {
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw InputError(folder.string(), "", "cannot be made (" + error.message() + "): give another folder");
-}
 
 CameraModel of_size(const CameraModel& camera, int width, int height) {
   const double scale = static_cast<double>(width) / camera.width;

@@ -121,4 +121,9 @@ void VirtualDisplay::release_key(const std::string& key) const {
   pause_ms(step_ms);
 }
 
+Eigen::Vector3i colour_at(const ImageU8& screen, const Eigen::Vector2d& pixel) {
+  const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
+  return {screen.at(x, y, 0), screen.at(x, y, 1), screen.at(x, y, 2)};
+}
+
 }  // namespace mf::test

@@ -48,4 +48,7 @@ class VirtualDisplay {
   ChildProcess server_;
 };
 
+// Red, green, blue of a screen's pixel.
+[[nodiscard]] Eigen::Vector3i colour_at(const ImageU8& screen, const Eigen::Vector2d& pixel);
+
 }  // namespace mf::test

@@ -12,15 +12,11 @@ namespace mf {
 namespace {
 
 using Eigen::Vector2d;
+using test::colour_at;
 using test::VirtualDisplay;
 
 const char* const mirrorfield = MF_BINARY_DIR "/mirrorfield";
 constexpr int width = 1000, height = 700;
-
-Eigen::Vector3i colour_at(const ImageU8& screen, const Vector2d& pixel) {
-  const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
-  return {screen.at(x, y, 0), screen.at(x, y, 1), screen.at(x, y, 2)};
-}
 
 class LightFieldWindow : public ::testing::Test {
  protected:

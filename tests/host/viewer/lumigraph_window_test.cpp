@@ -19,15 +19,11 @@ namespace fs = std::filesystem;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3i;
+using test::colour_at;
 using test::VirtualDisplay;
 
 const char* const mirrorfield = MF_BINARY_DIR "/mirrorfield";
 constexpr int width = 1000, height = 700;
-
-Vector3i colour_at(const ImageU8& screen, const Vector2d& pixel) {
-  const int x = static_cast<int>(pixel.x()), y = static_cast<int>(pixel.y());
-  return {screen.at(x, y, 0), screen.at(x, y, 1), screen.at(x, y, 2)};
-}
 
 Vector3i colour_of_photo(std::uint32_t photo) {
   const auto colour = field_colour(photo);
