@@ -6,15 +6,7 @@
 #include <limits>
 
 #include "host/blending/view_weights.h"
-#include "host/light_field/half_floats.h"
-
-// One machine code for every amd64, one for those with AVX2, FMA and F16C (x86-64-v3); the loader picks. Results differ
-// in the last bits between the two, never between runs or threads on one machine.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
-#define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v3", "default")))
-#else
-#define MF_VECTORIZED
-#endif
+#include "host/light_field/vectorized.h"
 
 namespace mf {
 
@@ -83,23 +75,6 @@ MF_VECTORIZED void distance_penalties(const Lanes3& p, const Lanes4& proxy_point
   }
 }
 
-MF_VECTORIZED void angle_penalties(const Lanes3& p, const Eigen::Vector3f& direction, const Eigen::Vector3f& centre,
-                                   const Lanes& weight, Lanes& penalty) {
-  const float cx = centre.x(), cy = centre.y(), cz = centre.z();
-  const float dx = direction.x(), dy = direction.y(), dz = direction.z();
-  for (std::size_t i = 0; i < block_lanes; ++i) {
-    const float rx = p.x.v[i] - cx, ry = p.y.v[i] - cy, rz = p.z.v[i] - cz;
-    const float inverse = 1 / std::sqrt(rx * rx + ry * ry + rz * rz);
-    const float x = rx * inverse - dx, y = ry * inverse - dy, z = rz * inverse - dz;
-    const float chord2 = x * x + y * y + z * z, h = 0.25F * chord2;
-    // 2 asin(chord / 2) by its series: exact to 10⁻⁵ below 60°, and rising beyond, where no view speaks anyway.
-    const float angle =
-        std::sqrt(chord2) *
-        (1 + h * (1.0F / 6 + h * (3.0F / 40 + h * (15.0F / 336 + h * (105.0F / 3456 + h * (945.0F / 42240))))));
-    penalty.v[i] = weight.v[i] >= smallest_view_weight ? angle / weight.v[i] : infinity;
-  }
-}
-
 MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes> view_weights, int k, float floor,
                               Lanes& confidence) {
   // The k + 1 least penalties of every texel, rising: each candidate sinks to its place.
@@ -157,10 +132,6 @@ MF_VECTORIZED void add_channel(const Patch<float>& seen, const Lanes& weight, La
   for (std::size_t i = 0; i < block_lanes; ++i) colour.v[i] += weight.v[i] * here.v[i];
 }
 
-MF_VECTORIZED void add_halves(const std::uint16_t* seen, float scale, const Lanes& weight, Lanes& colour) {
-  for (std::size_t i = 0; i < block_lanes; ++i) colour.v[i] += weight.v[i] * (scale * shifted_half(seen[i]));
-}
-
 }  // namespace
 
 void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3& colour) {
@@ -169,25 +140,12 @@ void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3
   add_channel(channel(seen, 2), weight, colour.z);
 }
 
-void add_colours(const std::uint16_t* seen, float unit, const Lanes& weight, Lanes3& colour) {
-  // In two steps, each within a float's range: half_unshift · unit may not be.
-  Lanes scaled;
-  for (std::size_t i = 0; i < block_lanes; ++i) scaled.v[i] = weight.v[i] * unit;
-  add_halves(seen, half_unshift, scaled, colour.x);
-  add_halves(seen + block_lanes, half_unshift, scaled, colour.y);
-  add_halves(seen + 2 * block_lanes, half_unshift, scaled, colour.z);
-}
-
 MF_VECTORIZED void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour) {
   for (std::size_t i = 0; i < block_lanes; ++i) {
     colour.x.v[i] += weight.v[i] * seen.x.v[i];
     colour.y.v[i] += weight.v[i] * seen.y.v[i];
     colour.z.v[i] += weight.v[i] * seen.z.v[i];
   }
-}
-
-MF_VECTORIZED void decode_weights(const std::uint16_t* halves, Lanes& out) {
-  for (std::size_t i = 0; i < block_lanes; ++i) out.v[i] = half_unshift * shifted_half(halves[i]);
 }
 
 MF_VECTORIZED void squared_ray_distances(const Eigen::Vector3f& p, const Eigen::Vector4f& proxy_point,
@@ -201,15 +159,6 @@ MF_VECTORIZED void squared_ray_distances(const Eigen::Vector3f& p, const Eigen::
     const float qx = px - cx, qy = py - cy, qz = pz - cz;
     const float x = qy * rz - qz * ry, y = qz * rx - qx * rz, z = qx * ry - qy * rx;
     out[i] = (x * x + y * y + z * z) / (rx * rx + ry * ry + rz * rz);
-  }
-}
-
-MF_VECTORIZED void squared_chords(const Eigen::Vector3f& direction, const float* ray_x, const float* ray_y,
-                                  const float* ray_z, const float* factor, std::size_t n, float* out) {
-  const float dx = direction.x(), dy = direction.y(), dz = direction.z();
-  for (std::size_t i = 0; i < n; ++i) {
-    const float x = ray_x[i] - dx, y = ray_y[i] - dy, z = ray_z[i] - dz;
-    out[i] = (x * x + y * y + z * z) * factor[i];
   }
 }
 

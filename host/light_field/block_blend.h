@@ -44,9 +44,6 @@ inline constexpr float smallest_view_weight = 0.02F;
 // ray_distance() of a view with centre C at every texel over the view's weight there.
 void distance_penalties(const Lanes3& p, const Lanes4& proxy_point, const Eigen::Vector3f& centre, const Lanes& weight,
                         Lanes& penalty);
-// The angle between the wanted direction (unit) and the view's ray through p, over the view's weight there.
-void angle_penalties(const Lanes3& p, const Eigen::Vector3f& direction, const Eigen::Vector3f& centre,
-                     const Lanes& weight, Lanes& penalty);
 
 // blend_weights() for every texel: `penalties` (one a candidate) become weights that sum to 1 over the candidates, each
 // divided by the view's own weight, ready for premultiplied colours. `confidence`: the sum of the weights of the views
@@ -57,18 +54,11 @@ void weights_of(std::span<Lanes> penalties, std::span<const Lanes> view_weights,
 void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3& colour);
 // The same where they are known at every texel.
 void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour);
-// The same for half floats by colour and lane, in `unit`.
-void add_colours(const std::uint16_t* seen, float unit, const Lanes& weight, Lanes3& colour);
-// Half floats of weights, by lane.
-void decode_weights(const std::uint16_t* halves, Lanes& out);
 
 // ---- ranking: one ray, many views ----
 
 // Squared ray_distance() of n views whose centres are given by coordinate.
 void squared_ray_distances(const Eigen::Vector3f& p, const Eigen::Vector4f& proxy_point, const float* centre_x,
                            const float* centre_y, const float* centre_z, std::size_t n, float* out);
-// |ray − direction|² · factor for n unit rays.
-void squared_chords(const Eigen::Vector3f& direction, const float* ray_x, const float* ray_y, const float* ray_z,
-                    const float* factor, std::size_t n, float* out);
 
 }  // namespace mf

@@ -230,14 +230,16 @@ std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const
     PlaneTile& tile = tiles[i];
     tile = {part.plane.min_m.cast<float>(), part.plane.max_m.cast<float>(), part.resolution, part.resolution, {}};
     tile.texels.assign(part.texel_count(), Eigen::Vector4f::Zero());
-    std::vector<Eigen::Vector4f> of_cell(part.texel_count());
+    const std::vector<std::size_t> cells(requests[i].cells.begin(), requests[i].cells.end());
+    std::vector<Eigen::Vector4f> of_cells(cells.size() * part.texel_count());
+    resamplers.local().fill(cells, of_cells.data());
     float solid_angle = 0;
-    for (const std::uint32_t cell : requests[i].cells) {
-      resamplers.local().fill(cell, of_cell.data());
-      filler.fill(cell, of_cell.data());
-      solid_angle += part.directions.solid_angles_sr[cell];
-      for (std::size_t t = 0; t < of_cell.size(); ++t)
-        tile.texels[t] += part.directions.solid_angles_sr[cell] * of_cell[t];
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      Eigen::Vector4f* of_cell = of_cells.data() + c * part.texel_count();
+      filler.fill(cells[c], of_cell);
+      solid_angle += part.directions.solid_angles_sr[cells[c]];
+      for (std::size_t t = 0; t < part.texel_count(); ++t)
+        tile.texels[t] += part.directions.solid_angles_sr[cells[c]] * of_cell[t];
     }
     for (Eigen::Vector4f& texel : tile.texels) texel /= solid_angle;
   });

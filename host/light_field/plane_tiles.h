@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "host/light_field/rectified_views.h"
@@ -10,31 +11,39 @@
 
 namespace mf {
 
-// Fills tiles of a light field whose proxy is the plane itself, from rectified views: weighted sums, no projection. The
-// views that could speak are ranked once a block, the weights are exact at every texel. One a thread: it
-// holds the working memory.
+// Fills tiles of a light field whose proxy is the plane itself, from rectified views: weighted sums, no projection.
+// Exact but for the choice of a block's views: those that exceed a bound of the adaptive threshold (view_weights.h),
+// which is found where blocks meet, at the vertices of a grid, by ranking all views there. One a thread: it holds the
+// working memory.
 class PlaneTiles {
  public:
   // Keeps references to both; `field` has everything but its texels.
   PlaneTiles(const RectifiedViews&, const LightField& field, int k);
 
-  // Precondition: `tile` holds resolution² texels.
-  void fill(std::size_t direction, Eigen::Vector4f* tile);
+  // Several directions at once, best neighbours: what views show of a block is then at hand for all of them.
+  // Precondition: `tiles` holds resolution² texels for each.
+  void fill(std::span<const std::size_t> directions, Eigen::Vector4f* tiles);
 
  private:
-  void find_candidates(const RectifiedViews::Block&);
-  void blend(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
+  struct Wanted {
+    Eigen::Vector3f direction;            // world
+    Eigen::Matrix3f from_world;           // into a frame whose third axis is the direction
+    std::vector<float> least_thresholds;  // inverse, by block: few views that matter there fall below
+  };
+  void find_thresholds(std::span<const std::size_t> directions);
+  [[nodiscard]] float inverse_threshold_at(const RectifiedViews::Vertex&, const Eigen::Vector3f& direction);
+  void find_candidates(const RectifiedViews::Block&, const Eigen::Vector3f& direction, float least_threshold);
+  void blend(const Wanted&, int block_x, int block_y, Lanes3& colour, Lanes& confidence);
 
   const RectifiedViews& views_;
   const LightField& field_;
-  int k_;
-  Eigen::Vector3f direction_;  // world
+  std::size_t k_;
+  std::vector<Wanted> wanted_;
 
   std::vector<float> bounds_;
   LeastPenalties ranking_;
-  std::vector<ViewPenalty> least_;
-  std::vector<std::size_t> candidates_;  // slots of the block at hand
-  std::vector<Lanes> penalties_, weights_;
+  std::vector<std::uint32_t> candidates_;  // slots of the block at hand
+  std::vector<Lanes> inverse_penalties_, sinking_;
 };
 
 // Copies a block's lanes into a tile of n² texels, as far as it reaches.

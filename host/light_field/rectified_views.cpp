@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "host/light_field/view_rays.h"
 
@@ -21,12 +22,15 @@ RectifiedViews::RectifiedViews(const std::vector<FieldView>& views, const PlaneR
     : grid_(plane, resolution),
       texel_m_(static_cast<float>(plane.size_m().maxCoeff() / resolution)),
       blocks_((resolution + block_side - 1) / block_side),
-      block_(static_cast<std::size_t>(blocks_ * blocks_)) {
+      block_(static_cast<std::size_t>(blocks_ * blocks_)),
+      vertex_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))) {
   for (const FieldView& view : views) {
     centre_.push_back(view.centre_in_world);
     unit_.push_back(view.levels.front().unit());
   }
   tbb::parallel_for(0, blocks_ * blocks_, [&](int i) { rectify(views, i % blocks_, i / blocks_); });
+  const int side = blocks_ + 1;
+  tbb::parallel_for(0, side * side, [&](int i) { look_at_vertex(views, i % side, i / side); });
 }
 
 namespace {
@@ -61,6 +65,17 @@ bool may_see(const FieldView& view, const std::array<Eigen::Vector3f, 4>& corner
   return left < 4 && right < 4 && above < 4 && below < 4;
 }
 
+// The largest angle between a unit ray and those through the corners.
+float spread_of(const Eigen::Vector3f& ray, const std::array<Eigen::Vector3f, 4>& corners,
+                const Eigen::Vector3f& centre) {
+  float spread = 0;
+  for (const Eigen::Vector3f& corner : corners) {
+    const Eigen::Vector3f other = corner - centre;
+    spread = std::max(spread, std::atan2(ray.cross(other).norm(), ray.dot(other)));
+  }
+  return spread;
+}
+
 }  // namespace
 
 void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, int block_y) {
@@ -79,9 +94,11 @@ void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, i
       const Eigen::Vector3f p =
           grid_.at(x0 + static_cast<float>(i % block_side) + 0.5F, y0 + static_cast<float>(i / block_side) + 0.5F);
       const Eigen::Vector4f shown = look_at(views[v], p, texel_m_);
+      const bool speaks = shown.w() >= smallest_view_weight;
       for (std::size_t c = 0; c < 3; ++c)
-        texels[c * block_lanes + i] = to_normal_half(shown[static_cast<Eigen::Index>(c)] / unit_[v]);
-      texels[3 * block_lanes + i] = to_normal_half(shown.w());
+        texels[c * block_lanes + i] =
+            speaks ? to_normal_half(shown[static_cast<Eigen::Index>(c)] / (unit_[v] * shown.w())) : std::uint16_t{0};
+      texels[3 * block_lanes + i] = speaks ? to_normal_half(shown.w()) : std::uint16_t{0};
       most = std::max(most, shown.w());
     }
     if (most < smallest_view_weight) continue;
@@ -90,8 +107,24 @@ void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, i
     block.ray_x.push_back(ray.x());
     block.ray_y.push_back(ray.y());
     block.ray_z.push_back(ray.z());
-    block.factor.push_back(1 / (most * most));
-    block.texels.insert(block.texels.end(), texels.begin(), texels.end());
+    block.spread_rad.push_back(spread_of(ray, corners, views[v].centre_in_world));
+    block.most.push_back(most);
+    block.halves.insert(block.halves.end(), texels.begin(), texels.end());
+  }
+}
+
+void RectifiedViews::look_at_vertex(const std::vector<FieldView>& views, int x, int y) {
+  const Eigen::Vector3f p = grid_.at(static_cast<float>(x * block_side), static_cast<float>(y * block_side));
+  Vertex& vertex = vertex_[static_cast<std::size_t>(y * (blocks_ + 1) + x)];
+  for (const FieldView& view : views) {
+    const float weight = look_at(view, p, texel_m_).w();
+    if (weight < smallest_view_weight) continue;
+    const Eigen::Vector3f ray = (p - view.centre_in_world).normalized();
+    vertex.ray_x.push_back(ray.x());
+    vertex.ray_y.push_back(ray.y());
+    vertex.ray_z.push_back(ray.z());
+    vertex.weight.push_back(weight);
+    vertex.factor.push_back(1 / (weight * weight));
   }
 }
 

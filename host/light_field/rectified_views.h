@@ -27,33 +27,42 @@ class RectifiedViews {
  public:
   RectifiedViews(const std::vector<FieldView>&, const PlaneRectangle&, int resolution);
 
-  // What the views that see some of it show of a block: for each 4 × 64 half floats (premultiplied red, green, blue in
-  // the view's unit; weight), by lane.
+  // What the views that see some of it show of a block: for each 4 × 64 half floats (straight red, green, blue in the
+  // view's unit; weight), by lane.
   struct Block {
     std::vector<std::uint32_t> views;        // rising
     std::vector<float> ray_x, ray_y, ray_z;  // of each through the block's middle, unit
-    std::vector<float> factor;               // 1 / weight², of the weight where it is largest
-    std::vector<std::uint16_t> texels;
+    std::vector<float> spread_rad;           // how far its rays through the block turn from that one
+    std::vector<float> most;                 // its weight where it is largest
+    std::vector<std::uint16_t> halves;
 
-    [[nodiscard]] const std::uint16_t* colours(std::size_t slot) const {
-      return texels.data() + slot * 4 * block_lanes;
-    }
-    [[nodiscard]] const std::uint16_t* weights(std::size_t slot) const { return colours(slot) + 3 * block_lanes; }
+    [[nodiscard]] const std::uint16_t* texels(std::size_t slot) const { return halves.data() + slot * 4 * block_lanes; }
+    [[nodiscard]] const std::uint16_t* weights(std::size_t slot) const { return texels(slot) + 3 * block_lanes; }
   };
-
+  // The views that see a point where blocks meet.
+  struct Vertex {
+    std::vector<float> ray_x, ray_y, ray_z;  // unit
+    std::vector<float> weight, factor;       // 1 / weight²
+  };
   [[nodiscard]] int blocks() const { return blocks_; }  // along a side
   [[nodiscard]] const Block& block(int x, int y) const { return block_[static_cast<std::size_t>(y * blocks_ + x)]; }
+  // Where blocks meet: blocks() + 1 along a side.
+  [[nodiscard]] const Vertex& vertex(int x, int y) const {
+    return vertex_[static_cast<std::size_t>(y * (blocks_ + 1) + x)];
+  }
   [[nodiscard]] const Eigen::Vector3f& centre(std::uint32_t view) const { return centre_[view]; }
   [[nodiscard]] float unit(std::uint32_t view) const { return unit_[view]; }
   [[nodiscard]] const TexelGrid& grid() const { return grid_; }
 
  private:
   void rectify(const std::vector<FieldView>&, int block_x, int block_y);
+  void look_at_vertex(const std::vector<FieldView>&, int x, int y);
 
   TexelGrid grid_;
   float texel_m_;
   int blocks_;
   std::vector<Block> block_;
+  std::vector<Vertex> vertex_;
   std::vector<Eigen::Vector3f> centre_;
   std::vector<float> unit_;
 };

@@ -128,11 +128,25 @@ double Resampling::focusing_s() const {
 }
 
 std::size_t Resampling::fill(std::size_t direction, Eigen::Vector4f* tile) {
+  std::size_t guessed = 0;
+  fill({&direction, 1}, tile, {&guessed, 1});
+  return guessed;
+}
+
+void Resampling::fill(std::span<const std::size_t> directions, Eigen::Vector4f* tiles, std::span<std::size_t> guessed) {
+  const std::size_t texels = impl_->field.texel_count();
   if (impl_->plane_tiles)
-    impl_->plane_tiles->local().fill(direction, tile);
+    impl_->plane_tiles->local().fill(directions, tiles);
   else
-    impl_->resamplers->local().fill(direction, tile);
-  return impl_->filler ? impl_->filler->fill(direction, tile) : 0;
+    for (std::size_t i = 0; i < directions.size(); ++i)
+      impl_->resamplers->local().fill(directions[i], tiles + i * texels);
+  for (std::size_t i = 0; i < directions.size(); ++i)
+    guessed[i] = impl_->filler ? impl_->filler->fill(directions[i], tiles + i * texels) : 0;
+}
+
+std::size_t Resampling::directions_at_once() const {
+  constexpr std::size_t on_plane = 32;  // what views show of a block is read once for all of them
+  return impl_->plane_tiles ? on_plane : 1;
 }
 
 Provenance Resampling::provenance(std::vector<std::string> frame_names) const {
@@ -157,10 +171,37 @@ struct FinishedTile {
   double packing_s = 0;
 };
 
-double mean_confidence_of(const std::vector<Eigen::Vector4f>& tile) {
+double mean_confidence_of(std::span<const Eigen::Vector4f> tile) {
   double sum = 0;
   for (const Eigen::Vector4f& texel : tile) sum += static_cast<double>(texel.w());
   return sum / static_cast<double>(tile.size());
+}
+
+// Fills and packs the tiles of successive directions.
+template <typename Pack>
+std::vector<FinishedTile> finish_tiles(Resampling& resampling, std::span<const std::size_t> directions,
+                                       const Pack& pack) {
+  const std::size_t texels = resampling.field().texel_count();
+  thread_local std::vector<Eigen::Vector4f> tiles;
+  tiles.resize(directions.size() * texels);
+  std::vector<std::size_t> guessed(directions.size());
+  auto start = Clock::now();
+  resampling.fill(directions, tiles.data(), guessed);
+  const double blending_s = seconds_since(start) / static_cast<double>(directions.size());
+  std::vector<FinishedTile> finished;
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const std::span<const Eigen::Vector4f> tile(tiles.data() + i * texels, texels);
+    start = Clock::now();
+    std::string packed = pack(directions[i], tile);
+    finished.push_back(
+        {directions[i], std::move(packed), mean_confidence_of(tile), guessed[i], blending_s, seconds_since(start)});
+  }
+  return finished;
+}
+
+// Whose turn a direction is: the ranks take turns by as many as are made at once.
+std::size_t turn_of(const Resampling& resampling, std::size_t direction) {
+  return direction / resampling.directions_at_once();
 }
 
 // Makes the tiles that are this rank's: (direction, tile) → string by `pack` in many threads, then `store` in the order
@@ -168,36 +209,28 @@ double mean_confidence_of(const std::vector<Eigen::Vector4f>& tile) {
 template <typename Pack, typename Store>
 void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, const Store& store) {
   const std::size_t directions = resampling.field().directions.size();
-  const std::size_t texels = resampling.field().texel_count();
+  const std::size_t at_once = resampling.directions_at_once();
   // So many that a slow tile does not hold up the others.
-  const std::size_t tiles_at_hand = 8 * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
-  std::size_t next = team.rank();
+  const std::size_t turns_at_hand =
+      (at_once > 1 ? 2 : 8) * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  std::size_t next = team.rank() * at_once;
   const auto deal = [&](tbb::flow_control& control) {
-    const std::size_t direction = next;
-    next += team.size();
-    if (direction >= directions) control.stop();
-    return direction;
+    std::vector<std::size_t> dealt;
+    for (std::size_t d = next; d < std::min(next + at_once, directions); ++d) dealt.push_back(d);
+    next += team.size() * at_once;
+    if (dealt.empty()) control.stop();
+    return dealt;
   };
-  const auto make = [&](std::size_t direction) {
-    thread_local std::vector<Eigen::Vector4f> tile;
-    tile.resize(texels);
-    FinishedTile finished;
-    finished.direction = direction;
-    auto start = Clock::now();
-    finished.filled = resampling.fill(direction, tile.data());
-    finished.blending_s = seconds_since(start);
-    finished.mean_confidence = mean_confidence_of(tile);
-    start = Clock::now();
-    finished.packed = pack(direction, tile);
-    finished.packing_s = seconds_since(start);
-    return finished;
-  };
+  using Dealt = std::vector<std::size_t>;
+  using Finished = std::vector<FinishedTile>;
   tbb::parallel_pipeline(
-      tiles_at_hand,
-      tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, deal) &
-          tbb::make_filter<std::size_t, FinishedTile>(tbb::filter_mode::parallel, make) &
-          tbb::make_filter<FinishedTile, void>(tbb::filter_mode::serial_in_order,
-                                               [&](FinishedTile finished) { store(std::move(finished)); }));
+      turns_at_hand,
+      tbb::make_filter<void, Dealt>(tbb::filter_mode::serial_in_order, deal) &
+          tbb::make_filter<Dealt, Finished>(tbb::filter_mode::parallel,
+                                            [&](const Dealt& dealt) { return finish_tiles(resampling, dealt, pack); }) &
+          tbb::make_filter<Finished, void>(tbb::filter_mode::serial_in_order, [&](const Finished& finished) {
+            for (const FinishedTile& tile : finished) store(tile);
+          }));
 }
 
 // What is summed up over the tiles, in their order.
@@ -257,7 +290,7 @@ ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangl
   LightField& field = result.field;
   field.rgbc.resize(field.directions.size() * field.texel_count());
   Tally tally;
-  const auto keep = [&](std::size_t direction, const std::vector<Eigen::Vector4f>& tile) {
+  const auto keep = [&](std::size_t direction, std::span<const Eigen::Vector4f> tile) {
     std::copy(tile.begin(), tile.end(), field.tile(direction));
     return std::string();
   };
@@ -276,7 +309,7 @@ ResampleResult resample_to_file(Resampling& resampling, const std::filesystem::p
   ResampleResult result = start_of_result(resampling);
   result.field.absolute = absolute;
   const DirectionSet& set = result.field.directions;
-  const auto pack = [&](std::size_t, const std::vector<Eigen::Vector4f>& tile) {
+  const auto pack = [&](std::size_t, std::span<const Eigen::Vector4f> tile) {
     return LightFieldWriter::pack(tile.data(), result.field.resolution);
   };
   Tally tally;
@@ -300,7 +333,8 @@ ResampleResult resample_to_file(Resampling& resampling, const std::filesystem::p
     report_progress(progress, "resampling", static_cast<double>(next) / static_cast<double>(set.size()));
   };
   const auto append_others = [&] {
-    while (next < set.size() && !team.has(next)) append(from_message(next, team.receive(next % team.size())));
+    while (next < set.size() && !team.has(turn_of(resampling, next)))
+      append(from_message(next, team.receive(turn_of(resampling, next) % team.size())));
   };
   make_tiles(resampling, team, pack, [&](const FinishedTile& tile) {
     append_others();

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -68,6 +69,10 @@ class Resampling {
   // One direction's tile, resolution² texels. In any thread, in any order: the result is the same. Returns how many of
   // them no view saw and were given a guess.
   std::size_t fill(std::size_t direction, Eigen::Vector4f* tile);
+  // Several at once, as many tiles after each other; `guessed`: by direction. Done fastest with
+  // directions_at_once() successive directions.
+  void fill(std::span<const std::size_t> directions, Eigen::Vector4f* tiles, std::span<std::size_t> guessed);
+  [[nodiscard]] std::size_t directions_at_once() const;
   // Which frames light which texels, by the names of the calibration's frames.
   [[nodiscard]] Provenance provenance(std::vector<std::string> frame_names) const;
 

@@ -91,6 +91,18 @@ void compare(const std::vector<FieldView>& views, const PlaneRectangle& rectangl
   std::vector<Eigen::Vector4f> tile(field.texel_count());
   double ours_s = 0, reference_s = 0, difference = 0, total = 0;
   int texels = 0, tiles = 0;
+  if (const char* n = getenv("FILL")) {
+    const double start = processor_s(RUSAGE_THREAD);
+    std::vector<std::size_t> ds, g(32);
+    std::vector<Eigen::Vector4f> ts(32 * tile.size());
+    for (int i = 0; i < atoi(n); i += 32) {
+      ds.clear();
+      for (int j = 0; j < 32; ++j) ds.push_back(static_cast<std::size_t>(i + j + 4000));
+      resampling.fill(ds, ts.data(), g);
+    }
+    fmt::print("{} tiles: {:.2f} ms a tile\n", n, 1e3 * (processor_s(RUSAGE_THREAD) - start) / atoi(n));
+    std::fflush(stdout);
+  }
   while (tiles < slice) {
     const std::size_t direction = any_direction(random);
     // Rays at an emitter follow other rules, which the reference does not know.
@@ -132,6 +144,10 @@ void compare_with_reference(const fs::path& session, int directions) {
   double start = processor_s(RUSAGE_SELF);
   const std::vector<FieldView> views = load_field_views(reader, response, calibration, Team(), {});
   fmt::print("loading: {:.1f} s processor\n", processor_s(RUSAGE_SELF) - start);
+  if (getenv("ONLY")) {
+    compare(views, rectangle.value(), "plane", directions, 40);
+    std::exit(0);
+  }
   for (const char* proxy : {"plane", "sphere:inf", "auto"}) compare(views, rectangle.value(), proxy, directions, 40);
 }
 

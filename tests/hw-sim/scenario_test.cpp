@@ -73,8 +73,8 @@ TEST_F(ScenarioTest, WhatGoesWrongIsRecordedAsWhatItIs) {
                 "[[fault]]\nkind = 'replug'\nat_s = 1.9\nseconds = 0.2\n"
                 "[[fault]]\nkind = 'io_error'\nat_s = 2.5\nseconds = 0.3\namount = 1\n"));
   EXPECT_EQ(result.last.state, RigState::done) << said_;
-  // The refused call is whichever comes first: a frame's own file is written anew beside it; after any other (the index,
-  // a folder's sync) the recording goes on in a second session.
+  // The refused call is whichever comes first: a frame's own file is written anew beside it; after any other (the
+  // index, a folder's sync) the recording goes on in a second session.
   const bool went_on = result.session.string().ends_with("-2");
   EXPECT_NE(result.last.problem.find(went_on ? "the recording goes on in" : "the disk refused"), std::string::npos)
       << result.last.problem;
