@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t most = CellInView::most_parts;
 
-// Loops with branches and roundings are beyond the compiler's own vectorizing: eight lanes, spelled out. Two neighbouring
-// texels are eight, too.
+// Loops with branches and roundings are beyond the compiler's own vectorizing: eight lanes, spelled out. Two
+// neighbouring texels are eight, too.
 constexpr std::size_t wide = 8;
 using Floats8 = float __attribute__((vector_size(32)));
 using Ints8 = std::int32_t __attribute__((vector_size(32)));

@@ -8,7 +8,6 @@
 
 #include "host/light_field/plane_tiles.h"
 
-extern "C" __attribute__((weak)) void scratch_class(int, int, int, std::size_t);
 namespace mf {
 
 namespace {
@@ -74,7 +73,6 @@ void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
       gather_candidates(x, y);
       Lanes3 colour{};
       Lanes confidence{};
-      if (scratch_class && near_emitter(x, y)) scratch_class(x, y, 0, candidates_.size());
       if (near_emitter(x, y))
         blend_near_emitter(x, y, colour, confidence);
       else
@@ -225,14 +223,12 @@ void TileResampler::penalize(const FieldView& view, const Lanes3& p, const Lanes
 void TileResampler::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {
   Rays rays;
   if (is_rough(bx, by)) {
-    if (scratch_class) scratch_class(bx, by, 1, candidates_.size());
     traced_rays(bx, by, rays);
     blend_texels(rays, colour, confidence);
     return;
   }
   interpolated_rays(bx, by, rays);
   see_vertices(bx, by);
-  if (scratch_class) scratch_class(bx, by, is_smooth() ? 2 : 3, candidates_.size());
   if (is_smooth())
     blend_patches(rays, colour, confidence);
   else
@@ -353,9 +349,7 @@ void TileResampler::blend_texels(const Rays& rays, Lanes3& colour, Lanes& confid
     best.add(penalties_[c]);
   }
   for (std::size_t c = 0; c < count; ++c)
-    ask(c, [&](std::size_t i) {
-      return distances_[c].v[i] > reach.v[i] && distances_[c].v[i] < best.greatest().v[i];
-    });
+    ask(c, [&](std::size_t i) { return distances_[c].v[i] > reach.v[i] && distances_[c].v[i] < best.greatest().v[i]; });
   weights_of(penalties_, weights_, penalty_.k, same_ray, confidence);
   for (std::size_t c = 0; c < count; ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
 }

@@ -21,6 +21,16 @@ TEST(DirectionSet, CellsTileTheHemisphere) {
 }
 
 // ∫ cos θ dω over the hemisphere is π; ∫ x² dω is 2π/3: both by the set's own directions and solid angles.
+// The smallest division that is not below what was asked for.
+TEST(DirectionSet, HoldsAtLeastAsManyAsAskedFor) {
+  for (const int count : {1, 11, 100, 2476, 2477, 9000}) {
+    const DirectionSet set = geodesic_hemisphere(count);
+    EXPECT_GE(set.size(), static_cast<std::size_t>(count));
+    if (set.frequency > 1)
+      EXPECT_LT(geodesic_hemisphere_of_frequency(set.frequency - 1).size(), static_cast<std::size_t>(count));
+  }
+}
+
 TEST(DirectionSet, IntegratesSmoothFunctions) {
   const DirectionSet set = geodesic_hemisphere(2500);
   double cosine = 0, square = 0;
