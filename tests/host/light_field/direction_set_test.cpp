@@ -24,8 +24,8 @@ TEST(DirectionSet, HoldsAtLeastAsManyAsAskedFor) {
   for (const int count : {1, 11, 100, 2476, 2477, 9000}) {
     const DirectionSet set = geodesic_hemisphere(count);
     EXPECT_GE(set.size(), static_cast<std::size_t>(count));
-    if (set.frequency > 1)
-      EXPECT_LT(geodesic_hemisphere_of_frequency(set.frequency - 1).size(), static_cast<std::size_t>(count));
+    if (set.frequency == 1) continue;
+    EXPECT_LT(geodesic_hemisphere_of_frequency(set.frequency - 1).size(), static_cast<std::size_t>(count));
   }
 }
 
