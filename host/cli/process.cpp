@@ -147,7 +147,7 @@ void add_process_command(CommandLine& program) {
   command.flag("--linear", a->photometry.linear,
                "use no exposure sweep: the sensor is linear from the black level to its last code");
   command.option("--height", a->resample.height_m, "height of the light-field plane above the world's ground, metres");
-  command.option("--directions", a->resample.directions, "about how many directions over the hemisphere");
+  command.option("--directions", a->resample.directions, "at least so many directions over the hemisphere");
   command.option("--size", a->resample.size, "texels along each side of the plane's rectangle");
   command.option("--proxy", a->resample.proxy, "what the views are focused on, as for `resample`");
   add_json_flag(command, a->json);

@@ -103,7 +103,7 @@ void add_resample_command(CommandLine& program) {
   command.option("session", a->session, "session folder with response.json and calibration.json", Presence::required);
   command.option("-o,--output", a->output, "light field to write, NAME.lf.exr", Presence::required);
   command.option("--height", a->options.height_m, "height of the light-field plane above the world's ground, metres");
-  command.option("--directions", a->options.directions, "about how many directions over the hemisphere");
+  command.option("--directions", a->options.directions, "at least so many directions over the hemisphere");
   command.option("--size", a->options.size, "texels along each side of the plane's rectangle");
   command.option("--proxy", a->options.proxy,
                  "what the views are focused on: auto (a distance per direction), sphere (the best radius), sphere:R "

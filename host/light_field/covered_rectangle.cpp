@@ -70,11 +70,21 @@ std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, 
   if (footprints.empty()) return std::nullopt;
   const Eigen::Vector2d origin = Eigen::Vector2d(median(xs), median(ys)).array() - 0.5 * grid_cells * cell_m;
   std::vector<int> count(static_cast<std::size_t>(grid_cells) * grid_cells, 0);
-  for (const Footprint& f : footprints)
-    for (int y = 0; y < grid_cells; ++y)
-      for (int x = 0; x < grid_cells; ++x)
+  for (const Footprint& f : footprints) {
+    Eigen::Array2d low = f[0], high = f[0];
+    for (const Eigen::Vector2d& corner : f) {
+      low = low.min(corner.array());
+      high = high.max(corner.array());
+    }
+    const auto cell = [&](const Eigen::Array2d& p) -> Eigen::Array2i {
+      return ((p - origin.array()) / cell_m).max(0).min(grid_cells).cast<int>();
+    };
+    const Eigen::Array2i first = cell(low), last = (cell(high) + 1).min(grid_cells);
+    for (int y = first.y(); y < last.y(); ++y)
+      for (int x = first.x(); x < last.x(); ++x)
         if (inside_convex(f, origin + cell_m * Eigen::Vector2d(x + 0.5, y + 0.5)))
           ++count[static_cast<std::size_t>(y * grid_cells + x)];
+  }
   const int needed =
       std::max(1, static_cast<int>(std::ceil(needed_share * *std::max_element(count.begin(), count.end()))));
   Eigen::Vector2i low(grid_cells, grid_cells), high(-1, -1);

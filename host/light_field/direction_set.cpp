@@ -161,19 +161,14 @@ DirectionSet geodesic_hemisphere_of_frequency(int frequency) {
 }
 
 DirectionSet geodesic_hemisphere(int count) {
-  check(count >= 11, "a direction set needs at least eleven directions");
-  // A full sphere has 10 f² + 2 vertices and the horizon cuts about 5 f of the lower half's cells.
-  const auto size_of = [](int f) { return 5.0 * f * f + 2.5 * f + 1; };
+  check(count >= 1, "a direction set needs a direction");
+  // A full sphere has 10 f² + 2 vertices; half of them and about 2.5 f that the horizon cuts reach above it. From one
+  // division less on, as that is an estimate.
   int f = 1;
-  while (size_of(f) < count) ++f;
-  const auto distance = [&](const DirectionSet& s) { return std::abs(static_cast<double>(s.size()) - count); };
-  DirectionSet best = geodesic_hemisphere_of_frequency(f);
-  for (const int other : {f - 1, f + 1}) {
-    if (other < 1) continue;
-    DirectionSet candidate = geodesic_hemisphere_of_frequency(other);
-    if (distance(candidate) < distance(best)) best = std::move(candidate);
-  }
-  return best;
+  while (5.0 * f * f + 2.5 * f + 1 < count) ++f;
+  DirectionSet set = geodesic_hemisphere_of_frequency(std::max(1, f - 1));
+  while (static_cast<double>(set.size()) < count) set = geodesic_hemisphere_of_frequency(set.frequency + 1);
+  return set;
 }
 
 std::vector<CellSample> split_cell(const DirectionSet& set, std::size_t i, int splits) {

@@ -31,7 +31,7 @@ struct DirectionSet {
   }
 };
 
-// The set whose size is nearest to `count` (sizes go by 5 f² and a rim). Precondition: count ≥ 11.
+// The smallest set of at least `count` directions (sizes go by 5 f² and a rim). Precondition: count ≥ 1.
 [[nodiscard]] DirectionSet geodesic_hemisphere(int count);
 [[nodiscard]] DirectionSet geodesic_hemisphere_of_frequency(int frequency);
 

@@ -9,6 +9,8 @@
 #include <limits>
 #include <span>
 
+#include "host/light_field/view_sieve.h"
+
 namespace mf {
 
 namespace {
@@ -76,16 +78,19 @@ DistanceSweep sweep_surroundings(const std::vector<FieldView>& views, const Plan
   sweep.level_step = 1 / nearest_m / static_cast<float>(level_count - 1);
   sweep.cost.assign(static_cast<std::size_t>(level_count),
                     ImageF(map_size, map_size, 1, std::numeric_limits<float>::infinity()));
+  const ViewSieve sieve(views);
   tbb::parallel_for(0, map_size, [&](int y) {
     if (!team.has(static_cast<std::size_t>(y))) return;
     std::vector<float> votes;
+    std::vector<std::uint32_t> voters;
     for (int x = 0; x < map_size; ++x)
       for (int level = 0; level < level_count; ++level) {
         const ProxyPoint point =
             proxy_point(sweep.centre_in_world, sweep.direction(x, y), static_cast<float>(level) * sweep.level_step);
         votes.clear();
-        for (const FieldView& view : views)
-          if (const auto value = log_luminance(view, point, sweep_angle_rad)) votes.push_back(*value);
+        sieve.find(point, sweep_angle_rad, voters);
+        for (const std::uint32_t v : voters)
+          if (const auto value = log_luminance(views[v], point, sweep_angle_rad)) votes.push_back(*value);
         if (votes.size() >= fewest_votes) sweep.cost[static_cast<std::size_t>(level)].at(x, y) = cost_of(votes, level);
       }
   });

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "host/light_field/view_rays.h"
+#include "host/light_field/view_sieve.h"
 
 namespace mf {
 
@@ -42,11 +43,19 @@ struct Votes {
   }
 };
 
-Votes ask(const std::vector<FieldView>& views, const ShadedEmitter& e, const Eigen::Vector3f& q, float angle) {
+struct Witnesses {
+  const std::vector<FieldView>& views;
+  ViewSieve sieve;
+};
+
+Votes ask(const Witnesses& witnesses, const ShadedEmitter& e, const Eigen::Vector3f& q, float angle) {
   Votes votes;
   const float full = std::max(e.radiance.sum(), 1e-6F);
   const ProxyPoint x = q.homogeneous();
-  for (const FieldView& view : views) {
+  thread_local std::vector<std::uint32_t> lookers;  // called for every texel of many maps: no allocation each time
+  witnesses.sieve.find(x, angle, lookers);
+  for (const std::uint32_t v : lookers) {
+    const FieldView& view = witnesses.views[v];
     if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ShadedEmitter::well_inside))
       continue;
     const Eigen::Vector3f pixel = pixel_of(view, x);
@@ -81,13 +90,13 @@ ImageF window_sums(const ImageF& in) {
 }
 
 // Variance and how many texels know it, for one distance everywhere; not summed yet.
-ImageF disagreement(const std::vector<FieldView>& views, const ShadedEmitter& e, float share, const Team& team) {
+ImageF disagreement(const Witnesses& witnesses, const ShadedEmitter& e, float share, const Team& team) {
   ImageF out(sweep_side, sweep_side, 2);
   const float angle = (e.mask_max_m - e.mask_min_m).mean() / sweep_side * (1 - share);
   tbb::parallel_for(0, sweep_side, [&](int y) {
     if (!team.has(static_cast<std::size_t>(y))) return;
     for (int x = 0; x < sweep_side; ++x) {
-      const Votes votes = ask(views, e, e.occluder_point(mask_position(e, sweep_side, x, y), share), angle);
+      const Votes votes = ask(witnesses, e, e.occluder_point(mask_position(e, sweep_side, x, y), share), angle);
       constexpr int enough = 4;
       if (votes.count < enough) continue;
       out.at(x, y, 0) = votes.variance();
@@ -121,9 +130,9 @@ std::size_t usual_share(const std::vector<ImageF>& sweep) {
 }
 
 // Share of the way from the plane to the emitter at which something may hide it, by line to the plane; one channel.
-ImageF sweep_distances(const std::vector<FieldView>& views, const Team& team, ShadedEmitter& e) {
+ImageF sweep_distances(const Witnesses& witnesses, const Team& team, ShadedEmitter& e) {
   std::vector<ImageF> sweep;
-  for (std::size_t i = 0; i < shares; ++i) sweep.push_back(disagreement(views, e, share_of(i), team));
+  for (std::size_t i = 0; i < shares; ++i) sweep.push_back(disagreement(witnesses, e, share_of(i), team));
   const std::size_t usual = usual_share(sweep);
   e.occluder_share = share_of(usual);
   std::vector<ImageF> sums;
@@ -157,7 +166,8 @@ void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& r
   };
   e.mask_min_m = corner(rectangle.min_m).array() - margin_m;
   e.mask_max_m = corner(rectangle.max_m).array() + margin_m;
-  const ImageF distances = sweep_distances(views, team, e);
+  const Witnesses witnesses{views, ViewSieve(views)};
+  const ImageF distances = sweep_distances(witnesses, team, e);
   e.mask = ImageF(mask_side, mask_side, 3);
   const float texel_m = (e.mask_max_m - e.mask_min_m).mean() / mask_side;
   tbb::parallel_for(0, mask_side, [&](int y) {
@@ -165,7 +175,7 @@ void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& r
     for (int x = 0; x < mask_side; ++x) {
       const float share = distances.at(x * sweep_side / mask_side, y * sweep_side / mask_side);
       const Votes votes =
-          ask(views, e, e.occluder_point(mask_position(e, mask_side, x, y), share), texel_m * (1 - share));
+          ask(witnesses, e, e.occluder_point(mask_position(e, mask_side, x, y), share), texel_m * (1 - share));
       e.mask.at(x, y, 2) = share;
       if (votes.weight <= 0) continue;
       e.mask.at(x, y, 0) = votes.mean();

@@ -10,6 +10,7 @@
 
 #include "host/blending/view_weights.h"
 #include "host/light_field/view_rays.h"
+#include "host/light_field/view_sieve.h"
 
 namespace mf {
 
@@ -60,9 +61,11 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
   ImageF panorama(width, height, 4);
   std::vector<std::uint32_t> all_views(views.size());
   std::iota(all_views.begin(), all_views.end(), 0U);
+  const ViewSieve sieve(views);
   tbb::parallel_for(0, height, [&](int y) {
     if (!team.has(static_cast<std::size_t>(y))) return;
     std::vector<ViewPenalty> ranked;
+    std::vector<std::uint32_t> lookers;
     std::array<ViewWeight, k> weights;
     for (int x = 0; x < width; ++x) {
       const Eigen::Vector3f d = direction_of(x, y, panorama);
@@ -80,7 +83,8 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
         continue;
       }
       ranked.clear();
-      for (std::uint32_t v = 0; v < views.size(); ++v) {
+      sieve.find(point, texel_rad, lookers);
+      for (const std::uint32_t v : lookers) {
         const float weight = look(views[v]).w();
         if (weight > 0.02F)
           ranked.push_back({v, ray_distance(surroundings.centre_in_world, point, views[v].centre_in_world) / weight});

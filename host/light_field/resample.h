@@ -21,7 +21,7 @@ namespace mf {
 
 struct ResampleOptions {
   double height_m = 0;    // of the light-field plane above the world's z = 0; the plane is parallel to the ground
-  int directions = 2500;  // about how many, over the hemisphere; ≥ 11
+  int directions = 2476;  // at least so many over the hemisphere (DirectionSet); 11 to 500000. 2476: 3° apart
   int size = 128;         // texels along each side of the rectangle; 2 to 1024
   // What the views are focused on. auto: a distance per direction by photo-consistency; sphere: one sphere whose radius
   // photo-consistency chooses; sphere:R (metres); sphere:inf; box: a room whose sides it chooses; box:X0,Y0,X1,Y1,H

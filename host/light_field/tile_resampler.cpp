@@ -3,8 +3,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 
 #include "host/light_field/plane_tiles.h"
 
@@ -18,8 +18,34 @@ constexpr std::size_t spare_views_near_emitter = 26;  // there many views have n
 constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
 constexpr float same_ray = 1e-4F;                     // rays closer than this are the same
 constexpr float largest_jump = 0.1F;                  // of the cell, see is_rough()
+constexpr float largest_bend = 0.1F;                  // of what is seen, see is_smooth()
 constexpr int outline_points = 3;                     // along a side: where it is tested who looks that way
 constexpr float outline_margin = 0.3F;                // of the outline's size, for what lies between those points
+
+Lanes all_lanes(float value) {
+  Lanes lanes;
+  lanes.v.fill(value);
+  return lanes;
+}
+
+// The few least values of every lane.
+class LeastLanes {
+ public:
+  explicit LeastLanes(std::size_t count) : rising_(count, all_lanes(std::numeric_limits<float>::infinity())) {}
+  void add(const Lanes& values) {
+    Lanes sinking = values;
+    for (Lanes& lanes : rising_)
+      for (std::size_t i = 0; i < block_lanes; ++i) {
+        const float a = lanes.v[i], b = sinking.v[i];
+        lanes.v[i] = std::min(a, b);
+        sinking.v[i] = std::max(a, b);
+      }
+  }
+  [[nodiscard]] const Lanes& greatest() const { return rising_.back(); }
+
+ private:
+  std::vector<Lanes> rising_;
+};
 
 }  // namespace
 
@@ -37,6 +63,7 @@ TileResampler::TileResampler(const std::vector<FieldView>& views, const LightFie
       reach_m_(best_lookers_.size(), 0) {}
 
 void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
+  ++tile_count_;
   prepare(direction);
   find_lookers();
   for (int y = 0; y <= blocks_; ++y)
@@ -48,8 +75,6 @@ void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
       Lanes confidence{};
       if (near_emitter(x, y))
         blend_near_emitter(x, y, colour, confidence);
-      else if (is_rough(x, y))
-        blend_rough(x, y, colour, confidence);
       else
         blend(x, y, colour, confidence);
       store_block(colour, confidence, x, y, field_.resolution, tile);
@@ -109,6 +134,7 @@ void TileResampler::find_lookers() {
   const std::size_t count = lookers_.views.size();
   bounds_.resize(std::max(bounds_.size(), count));
   mark_.resize(std::max(mark_.size(), count), 0);
+  cells_.resize(std::max(cells_.size(), count));
   seen_.resize(std::max(seen_.size(), count * patch_side * static_cast<std::size_t>(vertices_)));
 }
 
@@ -162,28 +188,17 @@ const Eigen::Vector4f& TileResampler::seen_at(std::size_t looker, int x, int y) 
       seen_[(looker * patch_side + static_cast<std::size_t>(y) % patch_side) * static_cast<std::size_t>(vertices_) +
             static_cast<std::size_t>(x)];
   if (seen.stamp != stamp) {
-    seen.colour = fetch_cell(views_[lookers_.views[looker]], vertex(x, y));
+    seen.colour = cell_of(looker).seen(views_[lookers_.views[looker]], vertex(x, y).focus);
     seen.stamp = stamp;
   }
   return seen.colour;
 }
 
-// Mean over the cell of what one view saw of it: premultiplied colour and weight.
-Eigen::Vector4f TileResampler::fetch_cell(const FieldView& view, const Vertex& v) const {
-  const int level = level_for_angle(view, v.focus, cell_.part_angle_rad);
-  const PremultipliedImage& image = view.levels[static_cast<std::size_t>(level)];
-  const float scale = 1.0F / static_cast<float>(1 << level);
-  const Eigen::Matrix3f turn = view.pixel_from_world.leftCols<3>();
-  const Eigen::Vector3f base = v.focus.w() * (turn * v.p + view.pixel_from_world.col(3));
-  PremultipliedImage::Lanes sum{};
-  float solid_angle = 0;
-  for (const CellSample& part : cell_.parts) {
-    const Eigen::Vector3f pixel = base + turn * part.direction;
-    solid_angle += part.solid_angle_sr;
-    const float inverse = scale / pixel.z();
-    if (pixel.z() > 0) image.add_bilinear(pixel.x() * inverse, pixel.y() * inverse, part.solid_angle_sr, sum);
-  }
-  return image.decoded(sum) / solid_angle;
+const CellInView& TileResampler::cell_of(std::size_t looker) {
+  LookersCell& known = cells_[looker];
+  if (known.tile != tile_count_)
+    known = {CellInView(views_[lookers_.views[looker]], cell_.direction, cell_.parts), tile_count_};
+  return known.cell;
 }
 
 float TileResampler::coarseness_of(const FieldView& view, const ProxyPoint& x) const {
@@ -206,27 +221,64 @@ void TileResampler::penalize(const FieldView& view, const Lanes3& p, const Lanes
 }
 
 void TileResampler::blend(int bx, int by, Lanes3& colour, Lanes& confidence) {
-  Lanes3 p;
-  Lanes4 focus;
+  Rays rays;
+  if (is_rough(bx, by)) {
+    traced_rays(bx, by, rays);
+    blend_texels(rays, colour, confidence);
+    return;
+  }
+  interpolated_rays(bx, by, rays);
+  see_vertices(bx, by);
+  if (is_smooth())
+    blend_patches(rays, colour, confidence);
+  else
+    blend_texels(rays, colour, confidence);
+}
+
+void TileResampler::interpolated_rays(int bx, int by, Rays& rays) const {
   Patch<Eigen::Vector4f> patch;
   const int x0 = bx * block_vertices, y0 = by * block_vertices;
   for (std::size_t i = 0; i < patch.size(); ++i)
     patch[i] = vertex(x0 + static_cast<int>(i % patch_side), y0 + static_cast<int>(i / patch_side)).focus;
-  interpolate(patch, focus);
+  interpolate(patch, rays.focus);
   set_points(grid_.at(static_cast<float>(bx * block_side) + 0.5F, static_cast<float>(by * block_side) + 0.5F),
-             grid_.step_x, grid_.step_y, p);
+             grid_.step_x, grid_.step_y, rays.p);
+}
+
+void TileResampler::see_vertices(int bx, int by) {
   patches_.resize(candidates_.size());
+  for (std::size_t c = 0; c < candidates_.size(); ++c)
+    for (std::size_t i = 0; i < patches_[c].size(); ++i)
+      patches_[c][i] = seen_at(candidates_[c], bx * block_vertices + static_cast<int>(i % patch_side),
+                               by * block_vertices + static_cast<int>(i / patch_side));
+}
+
+// Whether what the views saw may be interpolated: a cell that moves over an edge gets brighter on a bent line, and half
+// of a bend between two vertices shows at the vertices about it.
+bool TileResampler::is_smooth() const {
+  const auto bends = [](const Eigen::Vector4f& a, const Eigen::Vector4f& b, const Eigen::Vector4f& c) {
+    const Eigen::Array4f bend = (a - 2 * b + c).array().abs(), sum = (a + 2 * b + c).array();
+    return (bend > largest_bend * sum).any();
+  };
+  return std::none_of(patches_.begin(), patches_.end(), [&](const Patch<Eigen::Vector4f>& seen) {
+    for (std::size_t i = 0; i < patch_side; ++i) {
+      const std::size_t row = i * patch_side;
+      if (bends(seen[row], seen[row + 1], seen[row + 2])) return true;
+      if (bends(seen[i], seen[i + patch_side], seen[i + 2 * patch_side])) return true;
+    }
+    return false;
+  });
+}
+
+// What was seen at the vertices, interpolated.
+void TileResampler::blend_patches(const Rays& rays, Lanes3& colour, Lanes& confidence) {
   penalties_.resize(candidates_.size());
   weights_.resize(candidates_.size());
   for (std::size_t c = 0; c < candidates_.size(); ++c) {
     Patch<float> weight;
-    for (std::size_t i = 0; i < weight.size(); ++i) {
-      patches_[c][i] =
-          seen_at(candidates_[c], x0 + static_cast<int>(i % patch_side), y0 + static_cast<int>(i / patch_side));
-      weight[i] = patches_[c][i].w();
-    }
+    for (std::size_t i = 0; i < weight.size(); ++i) weight[i] = patches_[c][i].w();
     interpolate(weight, weights_[c]);
-    penalize(views_[candidate_views_[c]], p, focus, weights_[c], penalties_[c]);
+    penalize(views_[candidate_views_[c]], rays.p, rays.focus, weights_[c], penalties_[c]);
   }
   weights_of(penalties_, weights_, penalty_.k, same_ray, confidence);
   for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(patches_[c], penalties_[c], colour);
@@ -251,40 +303,55 @@ bool TileResampler::is_rough(int bx, int by) const {
   return false;
 }
 
-// Every texel by itself.
-void TileResampler::blend_rough(int bx, int by, Lanes3& colour, Lanes& confidence) {
-  Lanes3 p;
-  Lanes4 focus;
-  std::array<Vertex, block_lanes> texel;
+void TileResampler::traced_rays(int bx, int by, Rays& rays) const {
+  set_points(grid_.at(static_cast<float>(bx * block_side) + 0.5F, static_cast<float>(by * block_side) + 0.5F),
+             grid_.step_x, grid_.step_y, rays.p);
   for (std::size_t i = 0; i < block_lanes; ++i) {
-    Vertex& t = texel[i];
-    t.p = grid_.at(static_cast<float>(bx * block_side) + static_cast<float>(i % block_side) + 0.5F,
-                   static_cast<float>(by * block_side) + static_cast<float>(i / block_side) + 0.5F);
-    t.focus = proxy_point(t.p, cell_.direction, field_.surroundings.inverse_distance_along(t.p, cell_.direction));
-    p.x.v[i] = t.p.x();
-    p.y.v[i] = t.p.y();
-    p.z.v[i] = t.p.z();
-    focus.x.v[i] = t.focus.x();
-    focus.y.v[i] = t.focus.y();
-    focus.z.v[i] = t.focus.z();
-    focus.w.v[i] = t.focus.w();
+    const Eigen::Vector3f p(rays.p.x.v[i], rays.p.y.v[i], rays.p.z.v[i]);
+    const ProxyPoint x =
+        proxy_point(p, cell_.direction, field_.surroundings.inverse_distance_along(p, cell_.direction));
+    rays.focus.x.v[i] = x.x();
+    rays.focus.y.v[i] = x.y();
+    rays.focus.z.v[i] = x.z();
+    rays.focus.w.v[i] = x.w();
   }
-  seen_lanes_.resize(candidates_.size());
-  penalties_.resize(candidates_.size());
-  weights_.resize(candidates_.size());
-  for (std::size_t c = 0; c < candidates_.size(); ++c) {
-    const FieldView& view = views_[candidate_views_[c]];
+}
+
+// Every texel by itself. Most candidates pass a texel's ray too far off to speak for it, and a view's weight can only
+// add to its penalty. So the k + 1 that pass it nearest are asked first, then those that pass it nearer than the
+// greatest penalty of these.
+void TileResampler::blend_texels(const Rays& rays, Lanes3& colour, Lanes& confidence) {
+  const std::size_t count = candidates_.size(), speaking = static_cast<std::size_t>(penalty_.k) + 1;
+  seen_lanes_.resize(count);
+  distances_.resize(count);
+  penalties_.assign(count, all_lanes(std::numeric_limits<float>::infinity()));
+  weights_.assign(count, all_lanes(0));
+  LeastLanes nearest(speaking), best(speaking);
+  for (std::size_t c = 0; c < count; ++c) {
+    distance_penalties(rays.p, rays.focus, views_[candidate_views_[c]].centre_in_world, all_lanes(1), distances_[c]);
+    nearest.add(distances_[c]);
+  }
+  const auto ask = [&](std::size_t c, const auto& is_needed) {
+    Lanes needed;
+    float any = 0;
     for (std::size_t i = 0; i < block_lanes; ++i) {
-      const Eigen::Vector4f seen = fetch_cell(view, texel[i]);
-      seen_lanes_[c].x.v[i] = seen.x();
-      seen_lanes_[c].y.v[i] = seen.y();
-      seen_lanes_[c].z.v[i] = seen.z();
-      weights_[c].v[i] = seen.w();
+      needed.v[i] = is_needed(i) ? 1.0F : 0.0F;
+      any += needed.v[i];
     }
-    penalize(view, p, focus, weights_[c], penalties_[c]);
+    if (any == 0) return;
+    const FieldView& view = views_[candidate_views_[c]];
+    cell_of(candidates_[c]).seen(view, rays.focus, needed, seen_lanes_[c], weights_[c]);
+    penalize(view, rays.p, rays.focus, weights_[c], penalties_[c]);
+  };
+  const Lanes& reach = nearest.greatest();
+  for (std::size_t c = 0; c < count; ++c) {
+    ask(c, [&](std::size_t i) { return distances_[c].v[i] <= reach.v[i]; });
+    best.add(penalties_[c]);
   }
+  for (std::size_t c = 0; c < count; ++c)
+    ask(c, [&](std::size_t i) { return distances_[c].v[i] > reach.v[i] && distances_[c].v[i] < best.greatest().v[i]; });
   weights_of(penalties_, weights_, penalty_.k, same_ray, confidence);
-  for (std::size_t c = 0; c < candidates_.size(); ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
+  for (std::size_t c = 0; c < count; ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
 }
 
 // ---- near emitters ----

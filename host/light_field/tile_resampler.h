@@ -8,6 +8,7 @@
 
 #include "host/blending/ray_penalty.h"
 #include "host/light_field/block_blend.h"
+#include "host/light_field/cell_in_view.h"
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
@@ -54,6 +55,15 @@ class TileResampler {
     Eigen::Vector4f colour;  // premultiplied; weight
     std::uint32_t stamp = 0;
   };
+  struct LookersCell {
+    CellInView cell;
+    std::uint32_t tile = 0;  // for which it was made
+  };
+  // What a block's texels are blended at.
+  struct Rays {
+    Lanes3 p;
+    Lanes4 focus;
+  };
 
   void prepare(std::size_t direction);
   void find_lookers();
@@ -61,9 +71,14 @@ class TileResampler {
   void gather_candidates(int block_x, int block_y);
   void blend(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
   [[nodiscard]] bool is_rough(int block_x, int block_y) const;
-  void blend_rough(int block_x, int block_y, Lanes3& colour, Lanes& confidence);
+  void interpolated_rays(int block_x, int block_y, Rays&) const;
+  void traced_rays(int block_x, int block_y, Rays&) const;
+  void see_vertices(int block_x, int block_y);
+  [[nodiscard]] bool is_smooth() const;
+  void blend_patches(const Rays&, Lanes3& colour, Lanes& confidence);
+  void blend_texels(const Rays&, Lanes3& colour, Lanes& confidence);
   [[nodiscard]] const Eigen::Vector4f& seen_at(std::size_t looker, int vertex_x, int vertex_y);
-  [[nodiscard]] Eigen::Vector4f fetch_cell(const FieldView&, const Vertex&) const;
+  [[nodiscard]] const CellInView& cell_of(std::size_t looker);
 
   [[nodiscard]] bool near_emitter(int block_x, int block_y) const;
   [[nodiscard]] Eigen::Vector4f mean_near_emitter(const Eigen::Vector3f& p) const;
@@ -97,9 +112,11 @@ class TileResampler {
   std::uint32_t block_count_ = 0;
   std::vector<Seen> seen_;  // by looker, then three rows of vertices: blocks share their edges
   std::uint32_t row_count_ = 0;
+  std::vector<LookersCell> cells_;  // by looker
+  std::uint32_t tile_count_ = 0;
   std::vector<Patch<Eigen::Vector4f>> patches_;  // by candidate
-  std::vector<Lanes3> seen_lanes_;               // by candidate, in rough blocks
-  std::vector<Lanes> penalties_, weights_;
+  std::vector<Lanes3> seen_lanes_;               // by candidate, where texels are seen one by one
+  std::vector<Lanes> distances_, penalties_, weights_;
 };
 
 }  // namespace mf

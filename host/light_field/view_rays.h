@@ -2,6 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+
 #include "host/light_field/field_views.h"
 
 namespace mf {
@@ -34,7 +38,17 @@ using ProxyPoint = Eigen::Vector4f;
   return view.pixel_from_world * x;
 }
 
-// The level of a view whose texels are as large as an angle seen from p, or just smaller: floor(log2(angle in pixels)).
-[[nodiscard]] int level_for_angle(const FieldView& view, const ProxyPoint& x, float angle_rad);
+// The level of a view whose texels are as large as so many level-0 pixels, or just smaller: floor(log2(pixels)).
+[[nodiscard]] inline int level_of_pixels(const FieldView& view, float pixels) {
+  if (!(pixels > 1)) return 0;
+  constexpr std::uint32_t mantissa_bits = 23, exponent_bias = 127;
+  const auto level = static_cast<int>((std::bit_cast<std::uint32_t>(pixels) >> mantissa_bits) - exponent_bias);
+  return std::min(level, static_cast<int>(view.levels.size()) - 1);
+}
+// The same for an angle seen from p. Scaled as proxy_point() makes it, X lies at distance 1/s from p, so the same patch
+// seen from C subtends angle / |ray|.
+[[nodiscard]] inline int level_for_angle(const FieldView& view, const ProxyPoint& x, float angle_rad) {
+  return level_of_pixels(view, angle_rad / ray_to(x, view.centre_in_world).norm() * view.focal_px);
+}
 
 }  // namespace mf

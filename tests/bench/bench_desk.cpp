@@ -43,7 +43,7 @@ class Desk {
   [[nodiscard]] const std::string& session() const { return session_; }
 
   // Path of the field; empty on failure.
-  [[nodiscard]] std::string field(const std::string& proxy, int directions = 2500, int size = 128) {
+  [[nodiscard]] std::string field(const std::string& proxy, int directions = 2476, int size = 128) {
     std::string file = folder_ / (proxy + std::to_string(directions) + "x" + std::to_string(size) + ".lf.exr");
     if (fs::exists(file)) return file;
     const bool made = mirrorfield({"resample", session_, "-o", file, "--height", "0", "--directions",

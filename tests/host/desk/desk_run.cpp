@@ -23,7 +23,7 @@ struct Run {
     step({"import", desk_folder().string(), "-o", s});
     step({"photometry", s});
     step({"calibrate", s});
-    step({"resample", s, "-o", light_field.string(), "--height", "0", "--directions", "2500", "--size", "128"});
+    step({"resample", s, "-o", light_field.string(), "--height", "0", "--size", "128"});
   }
   void step(std::vector<std::string> arguments) {
     if (!failure.empty()) return;

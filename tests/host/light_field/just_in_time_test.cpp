@@ -30,7 +30,7 @@ class JustInTime : public ::testing::Test {
   static void SetUpTestSuite() {
     views_ = new std::vector(testing::analytic_views(200, 0.25F, 96, lamp_and_sky));
     ResampleOptions options;
-    options.directions = 700;
+    options.directions = 661;
     options.size = 32;
     options.proxy = "sphere:1.2";
     const Resampling focused(*views_, square, options, Team(), Progress());
