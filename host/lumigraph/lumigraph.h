@@ -22,6 +22,7 @@
 namespace mf {
 
 struct CandidateViews;
+struct WantedResolution;
 class TilePool;
 
 // What a picture of the lumigraph shows: the place, or which photo speaks for what, each in a colour of its own (the
@@ -29,7 +30,7 @@ class TilePool;
 enum class Shown { photos, blending_field };
 
 struct LumigraphOptions {
-  PenaltyOptions penalty{4, 1, 0.1F, 0.5F};  // angle: of the chord at the proxy point, radians
+  PenaltyOptions penalty{4, 1, 0.2F, 0.5F};  // angle: of the chord at the proxy point, radians
   float border = 0.03F;                      // 0.001 to 0.5 of a photo's shorter side: width of its soft border
   Shown shown = Shown::photos;
   std::optional<Moment>
@@ -92,6 +93,7 @@ class Lumigraph {
   void look_at_proxy(const Progress&);
   [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, const LumigraphOptions&) const;
   [[nodiscard]] CandidateViews speaking(std::span<const std::uint32_t> views) const;
+  [[nodiscard]] WantedResolution resolution_of(const View&, const CandidateViews& speaking) const;
 
   std::vector<Source> sources_;
   std::vector<AnsweringCamera> cameras_;

@@ -7,7 +7,7 @@
 
 // The loops over rays are written for the compiler's vectorizer: no branch but selections, no call. (This file is
 // compiled with -fno-math-errno, -fno-trapping-math and -fno-thread-jumps, without which they stay scalar.)
-#define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v3", "default")))
+#define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 
 namespace mf {
 
@@ -15,6 +15,10 @@ namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr float nearest = 1e-3F;  // of the depth in the new view: points nearer to a photo's camera plane are not in it
+
+// Octaves by which a bilinear fetch blurs more than a pixel of its texels' size does. Such a pixel is a box, of variance
+// 1/12; a texel is one too, and interpolation adds 1/6 on average: log₂ √3.
+constexpr float fetch_octaves = 0.7925F;
 
 // By value: the references of std::min and std::max keep a loop from being vectorized.
 inline float larger(float a, float b) {
@@ -57,6 +61,7 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
   const float per_border_px = v.per_border_px;
   const float alpha = o.angle;
   const float beta = o.resolution;
+  const float too_fine = rays.beyond + fetch_octaves;
 #pragma GCC ivdep  // the spans don't overlap
   for (std::size_t i = 0; i < count; ++i) {
     const float px = depth[i] * dx[i];
@@ -105,7 +110,7 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
 
     out_x[i] = u;
     out_y[i] = w;
-    out_lod[i] = larger(-octaves, 0.0F);
+    out_lod[i] = larger(-octaves - too_fine, 0.0F);
     plain[i] = alpha * chord + beta * larger(octaves, 0.0F) + of_time;
     inverse_depth[i] = inverse;
     weight[i] = inside ? border * border : 0.0F;

@@ -23,7 +23,8 @@ struct RayBundle {                    // at most largest_bundle rays
   std::span<const float> dx, dy, dz;  // world
   std::span<const float> depth;       // finite
   std::span<const float> nx, ny, nz;  // the proxy's normal at X, unit length, either side
-  float focal2 = 1;                   // fx · fy of the new view, px²
+  float focal2 = 1;  // fx · fy, px², of the new view, or of the finest photo if that is less
+  float beyond = 0;  // octaves by which the new view is finer than that
 };
 
 // What of a photo stays the same from view to view.
@@ -57,13 +58,14 @@ struct AnsweringView {
 // How one photo answers for each ray of a bundle.
 struct RayAnswers {
   std::span<float> x, y;     // photo pixels
-  std::span<float> lod;      // octaves by which the photo is finer than wanted, ≥ 0
+  std::span<float> lod;      // level of the photo's pyramid whose bilinear fetch blurs as a wanted pixel does, ≥ 0
   std::span<float> weight;   // 0…1: soft border times sight, see RayTerms; 0: it says nothing
   std::span<float> penalty;  // infinite where it says nothing
 };
 
 //   angle       the chord |u − v| of the unit vectors from X to E and to C: 2 sin(θ/2), exact where it counts, at 0
-//   resolution  octaves, from the areas that a patch of the proxy covers in both pictures: f² |n·(X−C)| / z³
+//   resolution  octaves, from the areas that a patch of the proxy covers in both pictures: f² |n·(X−C)| / z³. What the
+//               new view has beyond the finest photo (RayBundle) no photo can give, and none is blamed for
 //   weight      the soft border, times what the photo sees of X (SourceSight)
 // Only penalties below `worst` of their ray are finished; others are at least that, without what the photo sees of X.
 // Precondition: at most largest_bundle rays.

@@ -80,16 +80,15 @@ void TileRays::copy(std::size_t from, const TileRays& source, std::size_t to) {
   pixel[to] = source.pixel[from];
 }
 
-RayBundle TileRays::bundle(std::size_t first, std::size_t count, float focal2) const {
+RayBundle TileRays::bundle(std::size_t first, std::size_t count, const WantedResolution& wanted) const {
   const auto part = [&](const std::vector<float>& values) { return std::span(values).subspan(first, count); };
-  return {part(dx), part(dy), part(dz), part(depth), part(nx), part(ny), part(nz), focal2};
+  return {part(dx), part(dy), part(dz), part(depth), part(nx), part(ny), part(nz), wanted.focal2, wanted.beyond};
 }
 
 TileRenderer::TileRenderer(const TileFrame& frame, TileBuffers& buffers, const TakeChosen& take)
     : frame_(frame),
       buffers_(buffers),
       take_(take),
-      focal2_(static_cast<float>(frame.view.camera.fx() * frame.view.camera.fy())),
       plain_camera_(!frame.view.camera.has_distortion()) {
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   buffers.least_penalty.resize(entries);
@@ -159,7 +158,7 @@ void TileRenderer::shoot_block(int x0, int y0, int x1, int y1) {
 
 void TileRenderer::bound_from_below(const TileRays& rays, const Region& region, const CandidateViews& from, float below,
                                     CandidateViews& to) {
-  const Regions regions(rays.bundle(region.first, region.end - region.first, focal2_));
+  const Regions regions(rays.bundle(region.first, region.end - region.first, frame_.wanted));
   to.bound = below;
   to.views.clear();
   for (const CandidateView& candidate : from.views) {
@@ -178,7 +177,7 @@ void TileRenderer::rank_for_tile() {
   for (std::size_t i = 0; i < samples; ++i) picked.copy(i * (rays.size() - 1) / (samples - 1), rays, i);
   CandidateViews& of_tile = buffers_.of_tile;
   bound_from_below(rays, {0, rays.size()}, frame_.speaking, infinite, of_tile);
-  rank(picked.bundle(0, samples, focal2_), of_tile);
+  rank(picked.bundle(0, samples, frame_.wanted), of_tile);
   const auto worst = worst_of({buffers_.least_penalty, buffers_.least_candidate, samples, frame_.options.penalty.k});
   of_tile.bound = bound_slack * *std::max_element(worst.begin(), worst.end());
 }
@@ -204,7 +203,7 @@ void TileRenderer::rank(const RayBundle& bundle, const CandidateViews& candidate
 
 void TileRenderer::choose(const TileRays& rays, const Region& region, const CandidateViews& candidates) {
   const std::size_t count = region.end - region.first;
-  rank(rays.bundle(region.first, count, focal2_), candidates);
+  rank(rays.bundle(region.first, count, frame_.wanted), candidates);
   for (std::size_t i = 0; i < count; ++i) buffers_.pixel[i] = rays.pixel[region.first + i];
   if (candidates.bound == infinite) {
     hand_on(count, candidates);

@@ -28,6 +28,12 @@ using TakeChosen = std::function<void(const ChosenViews&)>;
 
 inline constexpr int tile_side = 64;  // pixels
 
+// See RayBundle.
+struct WantedResolution {
+  float focal2 = 1;
+  float beyond = 0;
+};
+
 // Rays of the new view, one value each, and what they meet: see RayBundle.
 struct TileRays {
   std::vector<float> dx, dy, dz, depth, nx, ny, nz;
@@ -36,7 +42,7 @@ struct TileRays {
   [[nodiscard]] std::size_t size() const { return pixel.size(); }
   void resize(std::size_t);
   void copy(std::size_t from, const TileRays& source, std::size_t to);
-  [[nodiscard]] RayBundle bundle(std::size_t first, std::size_t count, float focal2) const;
+  [[nodiscard]] RayBundle bundle(std::size_t first, std::size_t count, const WantedResolution&) const;
 };
 
 struct CandidateView {
@@ -56,6 +62,7 @@ struct TileFrame {
   float depth_tolerance = 0;             // see VisibilityOptions
   std::span<const AnsweringView> views;  // every photo, for this frame's eye
   const CandidateViews& speaking;        // those that may speak, bounds 0 and infinite
+  WantedResolution wanted{};
 };
 
 // The memory that a thread renders tiles with. It is worth keeping from frame to frame.
@@ -112,7 +119,6 @@ class TileRenderer {
   const TileFrame& frame_;
   TileBuffers& buffers_;
   const TakeChosen& take_;
-  float focal2_;
   bool plain_camera_;
   std::vector<Region> blocks_;  // of the tile's rays
 };

@@ -67,14 +67,31 @@ TEST(Lumigraph, ASourceCameraReturnsItsPhotoWithAnyProxy) {
   }
 }
 
+// Resolution that no photo has is asked of none: a picture finer than the photos still has its own photo alone.
+TEST(Lumigraph, AFinerPictureFromAPhotosPlaceIsThatPhotos) {
+  const Proxy walls = ball();
+  const std::vector<View> views = test::cap_of_views(12, 4, 40, pinhole(100, 50));
+  const Lumigraph lumigraph(photos_of(views, walls, blotches(0.25F)), ball());
+  const View finer{pinhole(300, 50), views[5].cam_from_world};
+  for (double x = 100.5; x < 200; x += 20) {
+    const auto weights = lumigraph.weights_at(finer, {x, 150.5}, {});
+    ASSERT_FALSE(weights.empty());
+    EXPECT_EQ(weights.front().view, 5U);
+    EXPECT_GT(weights.front().weight, 0.999F);
+  }
+}
+
 // Independent of the renderer: the penalties of every photo in double precision, from their definition.
 std::map<std::uint32_t, double> reference_weights(const std::vector<View>& views, const View& wanted,
                                                   const Eigen::Vector3d& x, const Eigen::Vector3d& normal,
                                                   const LumigraphOptions& o) {
+  const auto focal2 = [](const View& view) { return view.camera.fx() * view.camera.fy(); };
+  double finest = 0;
+  for (const View& view : views) finest = std::max(finest, focal2(view));
   const auto area = [&](const View& view) {
     const Eigen::Vector3d to = x - view.cam_from_world.inverse().translation;
     const double z = (view.cam_from_world * x).z();
-    return view.camera.fx() * view.camera.fy() * std::abs(normal.dot(to)) / (z * z * z);
+    return std::min(focal2(view), finest) * std::abs(normal.dot(to)) / (z * z * z);
   };
   const Eigen::Vector3d along = (x - wanted.cam_from_world.inverse().translation).normalized();
   std::vector<std::pair<double, std::uint32_t>> penalties;
