@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "common/response_curve.h"
+#include "common/seconds_since.h"
 #include "common/session.h"
 #include "host/calibration/calibrate.h"
 #include "host/calibration/colmap_export.h"

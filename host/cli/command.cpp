@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "common/error.h"
 
 namespace mf {
 
@@ -60,8 +63,15 @@ void print_summary(bool json, const nlohmann::json& summary, const std::string& 
     fmt::print("{}", text);
 }
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+void check_folder_of(const std::filesystem::path& output) {
+  const std::filesystem::path folder = output.parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    throw InputError(output.string(), "", "cannot be written: " + folder.string() + " is no folder; create it first");
+}
+
+void check_exr_output(const std::string& command, const std::string& flag, const std::filesystem::path& output) {
+  if (output.extension() != ".exr") throw InputError(command, flag, "'" + output.string() + "' must end in .exr");
+  check_folder_of(output);
 }
 
 Progress progress_bar() {

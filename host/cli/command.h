@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <chrono>
+#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -29,7 +29,10 @@ void add_json_flag(CommandLine& command, bool& json);
 // Prints `summary` as JSON (json) or `text` for people.
 void print_summary(bool json, const nlohmann::json& summary, const std::string& text);
 
-[[nodiscard]] double seconds_since(std::chrono::steady_clock::time_point start);
+// For before the work: throws InputError when the folder that `output` goes to does not exist.
+void check_folder_of(const std::filesystem::path& output);
+// That, and an ending other than .exr: what is written is EXR whatever its name.
+void check_exr_output(const std::string& command, const std::string& flag, const std::filesystem::path& output);
 
 // A progress bar on standard error; it appears when work takes longer than two seconds, and only on a terminal.
 [[nodiscard]] Progress progress_bar();

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
+#include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/picture_options.h"
 #include "host/io/exr.h"
@@ -40,10 +41,12 @@ void run(CompositeArguments& a) {
   const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
   StageSeconds stages;
   const LightSource source = open_light_source("composite", a.light, a.session, stages, progress_bar());
+  check_over_plane(a, mesh, plane_of(source));
   const IncidentLight light = light_for(source, mesh, a.light_options, stages);
   const auto rendering = std::chrono::steady_clock::now();
   const CompositeResult r = composite(light, mesh, plate, view, {a.options}, progress_bar());
   stages["rendering"] = seconds_since(rendering);
+  if (r.changed <= 0) refuse_unseen(a, mesh);
   write_pictures(a, r.picture);
   const double seconds = seconds_since(start);
   nlohmann::json summary = rendering_summary(r.layers, stages, seconds);

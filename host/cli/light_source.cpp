@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "common/error.h"
+#include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/session_views.h"
 #include "host/light_field/just_in_time.h"
@@ -79,11 +80,15 @@ LightSource open_light_source(const std::string& command, const std::filesystem:
   return Capture{std::move(session.views), focused.field(), focused.penalty()};
 }
 
+const PlaneRectangle& plane_of(const LightSource& source) {
+  const auto* field = std::get_if<LightField>(&source);
+  return field != nullptr ? field->plane : std::get<Capture>(source).focused.plane;
+}
+
 IncidentLight light_for(const LightSource& source, const TriangleMesh& mesh_in_world, const LightOptions& options,
                         StageSeconds& seconds) {
   const auto* field = std::get_if<LightField>(&source);
-  const PlaneRectangle& plane = field != nullptr ? field->plane : std::get<Capture>(source).focused.plane;
-  const Bounds object = bounds_of(transformed(plane.world_from_plane.inverse(), mesh_in_world));
+  const Bounds object = bounds_of(transformed(plane_of(source).world_from_plane.inverse(), mesh_in_world));
   if (field == nullptr) return light_of(std::get<Capture>(source), object, options, seconds);
   const auto start = Clock::now();
   IncidentLight light = incident_light(*field, object, options);

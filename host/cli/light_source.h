@@ -29,6 +29,8 @@ using StageSeconds = std::map<std::string, double>;
 [[nodiscard]] LightSource open_light_source(const std::string& command, const std::filesystem::path&,
                                             const ResampleOptions&, StageSeconds&, const Progress&);
 
+[[nodiscard]] const PlaneRectangle& plane_of(const LightSource&);
+
 // What a picture of the object needs of it. Adds "choosing" and "resampling" ("merging" for a file). It refers to a
 // file's light field, which must outlive it.
 [[nodiscard]] IncidentLight light_for(const LightSource&, const TriangleMesh& mesh_in_world, const LightOptions&,

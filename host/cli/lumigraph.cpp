@@ -10,6 +10,7 @@
 
 #include "common/error.h"
 #include "common/json_file.h"
+#include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/session_lumigraph.h"
 #include "host/io/image_file.h"
@@ -171,6 +172,7 @@ TwoPlane two_plane_of(const LumigraphArguments& a, const PhotoSet& set, const Lu
 void run_two_plane(const LumigraphArguments& a, const PhotoSet& set, const Lumigraph& lumigraph,
                    std::chrono::steady_clock::time_point start) {
   if (a.output.empty()) throw InputError("lumigraph", "--output", "is missing: name a folder for the light field");
+  if (a.st_distance && !(*a.st_distance > 0)) throw InputError("lumigraph", "--st-distance", "must be above 0");
   const TwoPlane planes = two_plane_of(a, set, lumigraph);
   const TwoPlaneSummary written = write_two_plane(a.output, lumigraph, planes, options_of(a, set), progress_bar());
   const fs::path transforms = a.output / "transforms.json";
@@ -206,7 +208,6 @@ void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const Lum
   const std::vector<double> times = a.time ? std::vector<double>{} : read_path_times(a.camera_path);
   LumigraphOptions options = options_of(a, set, !times.empty());
   const Progress progress = progress_bar();
-  make_folder(a.output);
   double render_s = 0;
   std::string extension;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -216,6 +217,7 @@ void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const Lum
     const LumigraphPicture frame = lumigraph.render(views[i], options);
     render_s += seconds_since(before);
     check_shows_something(frame, i, a);
+    make_folder(a.output);
     extension = write_picture(a.output / fmt::format("{:05}", i), frame.picture).extension();
   }
   report_progress(progress, "frames", 1);

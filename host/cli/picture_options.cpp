@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/cli/picture_options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -62,6 +64,7 @@ void check_picture_arguments(const std::string& command, PictureArguments& a) {
   for (const std::filesystem::path& output : a.outputs)
     if (output.extension() != ".exr" && output.extension() != ".png")
       throw InputError(command, "--output", "'" + output.string() + "' must end in .exr or .png");
+  for (const std::filesystem::path& output : a.outputs) check_folder_of(output);
   if (a.albedo && !(*a.albedo >= 0 && *a.albedo <= 1))
     throw InputError(command, "--albedo", "must lie between 0 and 1");
   if (!(a.exposure > 0)) throw InputError(command, "--exposure", "must be above 0");
@@ -73,6 +76,25 @@ void check_picture_arguments(const std::string& command, PictureArguments& a) {
   set_directions(a);
   if (const auto problem = a.light_options.validate()) throw InputError(command, "", *problem);
   if (const auto problem = a.options.validate()) throw InputError(command, "", *problem);
+}
+
+void check_over_plane(const PictureArguments& a, const TriangleMesh& mesh_in_world, const PlaneRectangle& plane) {
+  const Bounds bounds = bounds_of(transformed(plane.world_from_plane.inverse(), mesh_in_world));
+  constexpr float rounding_m = 1e-4F;  // what lies on the plane stays
+  if (bounds.high.z() < -rounding_m)
+    throw InputError(a.object.string(), "",
+                     fmt::format("lies wholly below the light field's plane (up to {:.3g} m under it), where no light "
+                                 "comes down to: give it world coordinates, metres, Z-up",
+                                 -bounds.low.z()));
+}
+
+void refuse_unseen(const PictureArguments& a, const TriangleMesh& mesh_in_world) {
+  const Bounds bounds = bounds_of(mesh_in_world);
+  throw InputError(
+      a.cameras.string(), fmt::format("[{}]", a.view),
+      fmt::format("shows nothing of {}, which is {:.3g} m wide about ({:.3g}, {:.3g}, {:.3g}): is it in "
+                  "world coordinates, metres, Z-up? Else give another --view",
+                  a.object.string(), 2 * bounds.radius, bounds.centre.x(), bounds.centre.y(), bounds.centre.z()));
 }
 
 void write_pictures(const PictureArguments& a, const ImageF& picture) {

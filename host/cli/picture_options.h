@@ -38,6 +38,12 @@ void add_picture_options(CommandLine& command, PictureArguments&);
 // neither .exr nor .png. Puts the options together.
 void check_picture_arguments(const std::string& command, PictureArguments&);
 
+// Throws InputError naming the object when all of it lies below the plane: light fields hold no light from there.
+void check_over_plane(const PictureArguments&, const TriangleMesh& mesh_in_world, const PlaneRectangle&);
+
+// Throws the InputError of a picture that would show neither the object nor what it does.
+[[noreturn]] void refuse_unseen(const PictureArguments&, const TriangleMesh& mesh_in_world);
+
 // Linear, three or four channels, to every output: half-float EXR, or PNG (sRGB, times the exposure, over black).
 void write_pictures(const PictureArguments&, const ImageF&);
 [[nodiscard]] std::string output_lines(const PictureArguments&);  // their names, a line each

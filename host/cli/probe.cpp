@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
@@ -92,6 +93,20 @@ ProbeFigures measure(const Probe& probe, LatLongConvention convention) {
   return figures;
 }
 
+// A light field tells what arrives near its plane: far from it is a slip of the unit or of the frame.
+void check_near_plane(const Eigen::Vector3d& at, const PlaneRectangle& plane) {
+  constexpr double reach = 10;  // diagonals of the rectangle
+  const Eigen::Vector3d p = plane.world_from_plane.inverse() * at;
+  const Eigen::Vector2d inside = p.head<2>().cwiseMax(plane.min_m).cwiseMin(plane.max_m);
+  const double distance_m = std::hypot((p.head<2>() - inside).norm(), p.z());
+  if (distance_m > reach * plane.size_m().norm())
+    throw InputError(
+        "probe", "--at",
+        fmt::format("is {:.3g} m from the light field's plane, {:.2f} × {:.2f} m at height {:.3g} m: give "
+                    "a point near it, world metres",
+                    distance_m, plane.size_m().x(), plane.size_m().y(), plane.world_from_plane.translation.z()));
+}
+
 void run(const ProbeArguments& a) {
   const auto convention = parse_lat_long_convention(a.consumer);
   if (!convention)
@@ -101,11 +116,23 @@ void run(const ProbeArguments& a) {
     throw InputError("probe", "--width", "must be an even number from 4 to 32768");
   const Eigen::Vector3d at(a.at[0], a.at[1], a.at[2]);
   if (!at.allFinite()) throw InputError("probe", "--at", "needs three finite numbers, world metres");
+  check_exr_output("probe", "--output", a.output);
+  if (!a.confidence.empty()) check_exr_output("probe", "--confidence", a.confidence);
+  if (std::filesystem::is_directory(a.field))
+    throw InputError(a.field.string(), "", "is a folder: make it a light field first, with `mirrorfield resample`");
   const LightField field = read_light_field(a.field);
+  check_near_plane(at, field.plane);
   Why why;
   if (!a.why.empty()) why = explain(a, field, at);
   const Probe probe = make_probe(field, at, *convention, a.width);
   const ProbeFigures figures = measure(probe, *convention);
+  constexpr double least_seen = 0.005;  // reads 0 %
+  if (figures.seen_share < least_seen)
+    throw InputError("probe", "--at",
+                     fmt::format("no view saw what arrives there: give a point over the rectangle {:.2f} {:.2f} {:.2f} "
+                                 "{:.2f} at height {:.3g}, world metres",
+                                 field.plane.min_m.x(), field.plane.min_m.y(), field.plane.max_m.x(),
+                                 field.plane.max_m.y(), field.plane.world_from_plane.translation.z()));
   ExrOptions options;
   options.latlong = *convention == LatLongConvention::openexr;  // the attribute promises OpenEXR's orientation
   options.attributes = {{"mfConsumer", a.consumer}, {"mfAt", fmt::format("{} {} {}", at.x(), at.y(), at.z())}};

@@ -8,6 +8,7 @@
 #include "common/atomic_file.h"
 #include "common/error.h"
 #include "common/json_file.h"
+#include "common/seconds_since.h"
 #include "common/session.h"
 #include "host/calibration/calibrate.h"
 #include "host/calibration/session_targets.h"

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "common/error.h"
+#include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/picture_options.h"
 
@@ -34,6 +35,12 @@ void add_ground(ImageF& picture, const RenderResult& r, double albedo) {
   }
 }
 
+bool is_uncovered(const ImageF& rgba) {
+  for (std::size_t i = 3; i < rgba.data.size(); i += 4)
+    if (rgba.data[i] > 0) return false;
+  return true;
+}
+
 void run(RenderArguments& a) {
   const auto start = std::chrono::steady_clock::now();
   check_picture_arguments("render", a);
@@ -49,6 +56,7 @@ void run(RenderArguments& a) {
   const TriangleMesh mesh = read_mesh(a.object, {a.albedo});
   StageSeconds stages;
   const LightSource source = open_light_source("render", a.light, a.session, stages, progress_bar());
+  check_over_plane(a, mesh, plane_of(source));
   a.light_options.plane = a.ground_albedo.has_value();
   const IncidentLight light = light_for(source, mesh, a.light_options, stages);
   const auto rendering = std::chrono::steady_clock::now();
@@ -58,6 +66,7 @@ void run(RenderArguments& a) {
   stages["rendering"] = seconds_since(rendering);
   ImageF picture = r.object;
   if (a.ground_albedo) add_ground(picture, r, *a.ground_albedo);
+  if (is_uncovered(picture)) refuse_unseen(a, mesh);
   write_pictures(a, picture);
   const double seconds = seconds_since(start);
   print_summary(a.json, rendering_summary(r, stages, seconds),

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/peak_memory.h"
 #include "host/cli/run_resample.h"
@@ -61,6 +62,8 @@ nlohmann::json summarize(const ResampleResult& r) {
 void run(ResampleArguments& a) {
   if (a.threads < 0)
     throw InputError("resample", "--threads", "must be a number of threads (0: as many as processors)");
+  check_exr_output("resample", "--output", a.output);
+  if (!a.provenance.empty()) check_exr_output("resample", "--provenance", a.provenance);
   if (!a.rectangle.empty())
     a.options.rectangle = std::array<double, 4>{a.rectangle[0], a.rectangle[1], a.rectangle[2], a.rectangle[3]};
   a.options.fill = !a.no_fill;

@@ -20,7 +20,7 @@ struct SessionViews {
 };
 
 // Session folder (with response.json and calibration.json) → views. Throws InputError for a folder that is no such
-// session, and, naming `command` and the flag, for options that no light field can have.
+// session or has fewer than two used frames, and, naming the flag, for options that no light field can have.
 [[nodiscard]] SessionViews load_session_views(const std::string& command, const std::filesystem::path& folder,
                                               const ResampleOptions&, const Team&, const Progress&);
 

@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+
 #include "common/error.h"
 #include "common/session.h"
 #include "host/cli/command.h"
 #include "host/cli/session_files.h"
+#include "host/cli/session_lumigraph.h"
 #include "host/light_field/resample.h"
 #include "host/lumigraph/read_photos.h"
 #include "host/viewer/layout.h"
 #include "host/viewer/light_field_window.h"
+#include "host/viewer/loading.h"
 #include "host/viewer/lumigraph_window.h"
 #include "host/viewer/session_window.h"
 
@@ -21,7 +28,9 @@ struct ViewArguments {
   double height_m = 0;
   std::filesystem::path colmap;
   std::filesystem::path transforms;
-  std::string proxy = "plane";
+  std::filesystem::path session;
+  bool scene = false;
+  std::string proxy;  // empty: plane, or of a session auto
   double scale = 1;
   std::filesystem::path path_folder = "path";
   std::vector<int> size{1280, 800};
@@ -41,39 +50,79 @@ Window open_window(const ViewArguments& a, const std::string& what) {
   return window;
 }
 
+// What cannot be opened opens no window when that shows at once, and also not where there is no display.
+template <typename T>
+void load_and_show(const ViewArguments& a, const std::string& what, const std::function<T(const Progress&)>& load,
+                   const std::function<void(Window&, T)>& show) {
+  std::optional<T> loaded;
+  Loading loading([&](const Progress& progress) { loaded.emplace(load(progress)); });
+  constexpr std::chrono::milliseconds quick(200);
+  const bool done = loading.ends_within(quick);
+  std::optional<Window> window;
+  try {
+    window.emplace(open_window(a, what));
+  } catch (const InputError&) {
+    loading.call_off();
+    throw;
+  }
+  if (done || show_loading(*window, loading, what)) show(*window, std::move(*loaded));
+}
+
 void view_light_field(const ViewArguments& a) {
-  LightField field = read_light_field(a.shown);
-  const std::string title = describe_field(a.shown, field);
-  Window window = open_window(a, a.shown.string());
-  show_light_field(window, std::move(field), title);
+  using Loaded = std::unique_ptr<LightFieldView>;
+  load_and_show<Loaded>(
+      a, a.shown.string(), [&](const Progress&) { return std::make_unique<LightFieldView>(read_light_field(a.shown)); },
+      [&](Window& window, Loaded view) { show_light_field(window, *view, describe_field(a.shown, view->field())); });
+}
+
+SessionView load_session(const ViewArguments& a) {
+  const SessionReader session(a.shown);
+  const Calibration calibration = calibration_of(session);
+  const MirrorTarget& target = session.header().target;
+  const std::string file = (session.folder() / "calibration.json").string();
+  const PlaneRectangle plane = chosen_rectangle(calibration, target, a.height_m, std::nullopt, file);
+  return {caught_rays(calibration, target), plane};
 }
 
 void view_session(const ViewArguments& a) {
-  const SessionReader session(a.shown);
-  const Calibration calibration = calibration_of(session);
-  const std::string file = (session.folder() / "calibration.json").string();
-  if (!calibration.cam_from_world)
-    throw InputError(file, "cam_from_world", "is missing: record world tags with the session and calibrate again");
-  const auto plane = covered_rectangle(calibration, session.header().target, a.height_m);
-  if (!plane)
-    throw InputError(file, "frames",
-                     fmt::format("no used frame caught light at height {} m: give another --height", a.height_m));
-  SessionView view(caught_rays(calibration, session.header().target), *plane);
-  const Eigen::Vector2d size = plane->size_m();
-  const std::string title = fmt::format("{}: {} frames over {:.2f} × {:.2f} m at height {} m", a.shown.string(),
-                                        view.frames(), size.x(), size.y(), a.height_m);
-  Window window = open_window(a, a.shown.string());
-  show_session(window, std::move(view), title);
+  load_and_show<SessionView>(
+      a, a.shown.string(), [&](const Progress&) { return load_session(a); },
+      [&](Window& window, SessionView view) {
+        const Eigen::Vector2d size = view.plane().size_m();
+        const std::string title = fmt::format("{}: {} frames over {:.2f} × {:.2f} m at height {} m", a.shown.string(),
+                                              view.frames(), size.x(), size.y(), a.height_m);
+        show_session(window, std::move(view), title);
+      });
+}
+
+PhotoSet read_photos(const ViewArguments& a, const Progress& progress) {
+  if (!a.session.empty()) return read_session_photos(a.session, a.scale, a.scene, progress);
+  return scaled(read_posed_photos(a.colmap, a.transforms), a.scale);
+}
+
+Proxy proxy_of(const ViewArguments& a, const PhotoSet& set, const Progress& progress) {
+  if (!a.session.empty()) return session_proxy(a.proxy.empty() ? "auto" : a.proxy, set, a.session, progress);
+  return make_proxy(a.proxy.empty() ? "plane" : a.proxy, set, a.colmap.empty() ? a.transforms.parent_path() : a.colmap);
 }
 
 void view_photos(const ViewArguments& a) {
   if (!(a.scale > 0 && a.scale <= 1)) throw InputError("view", "--scale", "must be above 0 and at most 1");
-  const PhotoSet set = scaled(read_posed_photos(a.colmap, a.transforms), a.scale);
-  Proxy proxy = make_proxy(a.proxy, set, a.colmap.empty() ? a.transforms.parent_path() : a.colmap);
-  const std::string title = fmt::format("{}: {} photos, proxy {}", set.source, set.photos.size(), describe(proxy));
-  LumigraphView view(Lumigraph(set, std::move(proxy), {}, progress_bar()));
-  Window window = open_window(a, set.source);
-  show_lumigraph(window, std::move(view), {title, a.path_folder});
+  struct Loaded {
+    LumigraphView view;
+    std::string title;
+  };
+  const std::filesystem::path& what = !a.session.empty() ? a.session : a.colmap.empty() ? a.transforms : a.colmap;
+  load_and_show<Loaded>(
+      a, what.string(),
+      [&](const Progress& progress) {
+        const PhotoSet set = read_photos(a, progress);
+        Proxy proxy = proxy_of(a, set, progress);
+        std::string title = fmt::format("{}: {} photos, proxy {}", set.source, set.photos.size(), describe(proxy));
+        return Loaded{LumigraphView(Lumigraph(set, std::move(proxy), {}, progress)), std::move(title)};
+      },
+      [&](Window& window, Loaded loaded) {
+        show_lumigraph(window, std::move(loaded.view), {loaded.title, a.path_folder});
+      });
 }
 
 void run(const ViewArguments& a) {
@@ -82,9 +131,10 @@ void run(const ViewArguments& a) {
     throw InputError("view", "--size",
                      fmt::format("must be a width from {} and a height from {} to 16384 pixels",
                                  smallest_window_width_px, smallest_window_height_px));
-  if (int{!a.shown.empty()} + int{!a.colmap.empty()} + int{!a.transforms.empty()} != 1)
+  if (int{!a.shown.empty()} + int{!a.colmap.empty()} + int{!a.transforms.empty()} + int{!a.session.empty()} != 1)
     throw InputError("view", "",
-                     "needs one thing to show: a light field, a session, --colmap FOLDER or --transforms FILE");
+                     "needs one thing to show: a light field, a session, --colmap FOLDER, --transforms FILE or "
+                     "--session FOLDER");
   if (a.shown.empty())
     view_photos(a);
   else if (std::filesystem::is_directory(a.shown))
@@ -99,12 +149,15 @@ void add_view_command(CommandLine& program) {
   CommandLine command =
       program.command("view", "a window into a light field, a session, or the space between posed photos");
   const auto a = std::make_shared<ViewArguments>();  // shared: the parser's callback outlives this function
-  command.option("shown", a->shown, "light field (.lf.exr), or a session's folder");
+  command.option("shown", a->shown, "light field (.lf.exr), or a session's folder: where its frames caught light");
   command.option("--height", a->height_m, "session: of the plane above the world's ground, metres");
   command.option("--colmap", a->colmap, "photos: folder of a COLMAP text model");
   command.option("--transforms", a->transforms, "photos: transforms.json of nerfstudio or instant-ngp");
+  command.option("--session", a->session, "photos: what the frames of a calibrated session saw in the mirror");
+  command.flag("--scene", a->scene, "with --session: its pictures without the mirror too");
   command.option("--proxy", a->proxy,
-                 "photos: plane, plane:D, sphere:R, box, tunnel:W,H[,D] or a mesh, as for lumigraph");
+                 "photos: plane (default), plane:D, sphere:R, box, tunnel:W,H[,D] or a mesh, as for lumigraph; with "
+                 "--session also auto (default) or a light field, NAME.lf.exr");
   command.option("--scale", a->scale, "photos: size that they are brought to first, 0 to 1");
   command.option("--path", a->path_folder, "photos: folder for a recorded camera path, its frames and its film");
   command.values("--size", 2, a->size, "width and height of the window, pixels (1280 800)");

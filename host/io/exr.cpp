@@ -82,13 +82,14 @@ ImageF read_channels(Imf::InputFile& input, const std::string& file) {
   return image;
 }
 
-void require_no_nan(const ImageF& image, const std::string& file) {
+void require_finite(const ImageF& image, const std::string& file) {
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x)
       for (int c = 0; c < image.channels; ++c)
-        if (std::isnan(image.at(x, y, c)))
+        if (!std::isfinite(image.at(x, y, c)))
           throw InputError(file, fmt::format("pixel ({}, {}), channel {}", x, y, c),
-                           "is not a number: repair the picture");
+                           std::isnan(image.at(x, y, c)) ? "is not a number: repair the picture"
+                                                         : "is infinite: bring it down to a finite value");
 }
 
 }  // namespace
@@ -109,7 +110,7 @@ ImageF decode_exr(std::string_view bytes, const std::string& file) {
     throw InputError(file, "",
                      fmt::format("is no EXR, or is truncated or damaged ({}): copy or make it again", e.what()));
   }
-  require_no_nan(image, file);
+  require_finite(image, file);
   return image;
 }
 

@@ -49,6 +49,13 @@ void append(TriangleMesh& mesh, const aiMesh& part, const Eigen::Vector3f& albed
   }
 }
 
+// What Assimp says, in words for someone who did not write it.
+std::string why_unread(const std::string& complaint) {
+  if (complaint.starts_with("No output meshes")) return "holds no triangle: export the mesh with its faces";
+  return "is no mesh that can be read, or is cut off (" + complaint.substr(0, complaint.find_last_not_of(" .\n") + 1) +
+         "): export it again";
+}
+
 bool is_gltf(const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
   return extension == ".gltf" || extension == ".glb" || extension == ".GLTF" || extension == ".GLB";
@@ -91,8 +98,7 @@ TriangleMesh read_mesh(const std::filesystem::path& path, const MeshOptions& opt
   const aiScene* scene =
       importer.ReadFile(file, aiProcess_Triangulate | aiProcess_PreTransformVertices | aiProcess_GenNormals |
                                   aiProcess_JoinIdenticalVertices | aiProcess_SortByPType);
-  if (scene == nullptr || scene->mNumMeshes == 0)
-    throw InputError(file, "", "holds no mesh that can be read (" + std::string(importer.GetErrorString()) + ")");
+  if (scene == nullptr || scene->mNumMeshes == 0) throw InputError(file, "", why_unread(importer.GetErrorString()));
   TriangleMesh mesh;
   for (unsigned i = 0; i < scene->mNumMeshes; ++i) {
     const aiMesh& part = *scene->mMeshes[i];

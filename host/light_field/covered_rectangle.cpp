@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
+#include "common/error.h"
 #include "common/virtual_view.h"
 #include "host/light_field/resample.h"
 
@@ -13,6 +16,8 @@ constexpr double cell_m = 0.01;
 constexpr int grid_cells = 400;       // 4 × 4 m about the middle of the footprints
 constexpr double needed_share = 0.1;  // of the views that pass the best-covered point
 constexpr double lowest_slope = 0.1;  // z of a unit ray: flatter ones reach the plane far outside
+// How far the plane may be from the mirrors, in distances from the camera to them: beyond, it is a slip of the unit.
+constexpr double farthest_plane = 10;
 
 using Footprint = std::array<Eigen::Vector2d, 4>;
 
@@ -31,7 +36,7 @@ std::optional<Footprint> footprint_on_plane(const Calibration& calibration, cons
     const Eigen::Vector2d corner = half.cwiseProduct(signs[i]);
     const Eigen::Vector3d ray =
         (world_from_cam * (pose.cam_from_mirror * Eigen::Vector3d(corner.x(), corner.y(), 0)) - centre).normalized();
-    if (ray.z() < lowest_slope) return std::nullopt;
+    if (ray.z() < lowest_slope || height_m <= centre.z()) return std::nullopt;
     footprint[i] = (centre + (height_m - centre.z()) / ray.z() * ray).head<2>();
   }
   return footprint;
@@ -52,22 +57,56 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+std::vector<Footprint> footprints_on_plane(const Calibration& calibration, const MirrorTarget& target,
+                                           double height_m) {
+  std::vector<Footprint> footprints;
+  for (const MirrorPose& pose : calibration.frames) {
+    const auto footprint = pose.used ? footprint_on_plane(calibration, pose, target, height_m) : std::nullopt;
+    if (footprint) footprints.push_back(*footprint);
+  }
+  return footprints;
+}
+
+// Some view looks through the rectangle, as far as boxes around both can tell.
+bool is_looked_through(const std::vector<Footprint>& footprints, const std::array<double, 4>& r) {
+  return std::any_of(footprints.begin(), footprints.end(), [&](const Footprint& f) {
+    const auto [x0, x1] = std::minmax({f[0].x(), f[1].x(), f[2].x(), f[3].x()});
+    const auto [y0, y1] = std::minmax({f[0].y(), f[1].y(), f[2].y(), f[3].y()});
+    return x0 < r[2] && x1 > r[0] && y0 < r[3] && y1 > r[1];
+  });
+}
+
+// Where the mirrors of the used frames were.
+struct Sweep {
+  double lowest_m = 0, highest_m = 0;  // above the world's ground
+  double from_camera_m = 0;            // median
+};
+std::optional<Sweep> sweep_of(const Calibration& calibration) {
+  std::vector<double> heights, distances;
+  const Rigid3 world_from_cam = calibration.cam_from_world->inverse();
+  for (const MirrorPose& pose : calibration.frames) {
+    if (!pose.used) continue;
+    heights.push_back((world_from_cam * pose.cam_from_mirror.translation).z());
+    distances.push_back(pose.cam_from_mirror.translation.norm());
+  }
+  if (heights.empty()) return std::nullopt;
+  const auto [lowest, highest] = std::minmax_element(heights.begin(), heights.end());
+  return Sweep{*lowest, *highest, median(distances)};
+}
+
 }  // namespace
 
 std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, const MirrorTarget& target,
                                                 double height_m) {
   if (!calibration.cam_from_world) return std::nullopt;
-  std::vector<Footprint> footprints;
+  const std::vector<Footprint> footprints = footprints_on_plane(calibration, target, height_m);
+  if (footprints.empty()) return std::nullopt;
   std::vector<double> xs, ys;
-  for (const MirrorPose& pose : calibration.frames) {
-    const auto footprint = pose.used ? footprint_on_plane(calibration, pose, target, height_m) : std::nullopt;
-    if (!footprint) continue;
-    footprints.push_back(*footprint);
-    const Eigen::Vector2d centre = 0.25 * ((*footprint)[0] + (*footprint)[1] + (*footprint)[2] + (*footprint)[3]);
+  for (const Footprint& f : footprints) {
+    const Eigen::Vector2d centre = 0.25 * (f[0] + f[1] + f[2] + f[3]);
     xs.push_back(centre.x());
     ys.push_back(centre.y());
   }
-  if (footprints.empty()) return std::nullopt;
   const Eigen::Vector2d origin = Eigen::Vector2d(median(xs), median(ys)).array() - 0.5 * grid_cells * cell_m;
   std::vector<int> count(static_cast<std::size_t>(grid_cells) * grid_cells, 0);
   for (const Footprint& f : footprints) {
@@ -94,11 +133,48 @@ std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, 
         low = low.cwiseMin(Eigen::Vector2i(x, y));
         high = high.cwiseMax(Eigen::Vector2i(x + 1, y + 1));
       }
+  if ((high.array() <= low.array()).any()) return std::nullopt;  // they pass no common place
   PlaneRectangle rectangle;
   rectangle.world_from_plane.translation.z() = height_m;
   rectangle.min_m = origin + cell_m * low.cast<double>();
   rectangle.max_m = origin + cell_m * high.cast<double>();
   return rectangle;
+}
+
+PlaneRectangle chosen_rectangle(const Calibration& calibration, const MirrorTarget& target, double height_m,
+                                const std::optional<std::array<double, 4>>& wanted, const std::string& file) {
+  if (!calibration.cam_from_world)
+    throw InputError(file, "cam_from_world", "is missing: record world tags with the session and calibrate again");
+  const auto sweep = sweep_of(calibration);
+  if (!sweep) throw InputError(file, "frames", "has no used frame: calibrate again, or record more");
+  const std::string waved =
+      fmt::format("the mirror was waved {:.2f} to {:.2f} m above the ground", sweep->lowest_m, sweep->highest_m);
+  const double reach_m = farthest_plane * sweep->from_camera_m;
+  if (height_m > sweep->highest_m + reach_m || height_m < sweep->lowest_m - reach_m)
+    throw InputError(
+        file, "--height",
+        fmt::format("{:g} m is no place for the plane: {}; give a height near that, in metres", height_m, waved));
+  const auto covered = covered_rectangle(calibration, target, height_m);
+  if (!covered)
+    throw InputError(
+        file, "--height",
+        fmt::format("no mirror view looks through a plane at {:g} m: {}; give a height near that", height_m, waved));
+  if (wanted) {
+    if (!is_looked_through(footprints_on_plane(calibration, target, height_m), *wanted))
+      throw InputError(file, "--rectangle",
+                       fmt::format("no mirror view looks through it: at this --height they cover {:.2f} {:.2f} {:.2f} "
+                                   "{:.2f}; give a part of that, world metres",
+                                   covered->min_m.x(), covered->min_m.y(), covered->max_m.x(), covered->max_m.y()));
+    const auto& r = *wanted;
+    return {{Eigen::Quaterniond::Identity(), {0, 0, height_m}}, {r[0], r[1]}, {r[2], r[3]}};
+  }
+  const double searched_m = grid_cells * cell_m;
+  if (covered->size_m().maxCoeff() > searched_m - 0.5 * cell_m)
+    throw InputError(file, "--height",
+                     fmt::format("the views spread over more than {:g} × {:g} m at {:g} m: {}; give a height near "
+                                 "that, or --rectangle",
+                                 searched_m, searched_m, height_m, waved));
+  return *covered;
 }
 
 }  // namespace mf

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/light_field/proxy_choice.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -33,6 +35,16 @@ Surroundings given_box(const RoomBox& box, const PlaneRectangle& rectangle) {
   return box_surroundings(centre_of(rectangle), box);
 }
 
+Surroundings given_sphere(double radius_m, const PlaneRectangle& rectangle) {
+  const double least_m = 0.5 * rectangle.size_m().norm();
+  if (radius_m <= least_m)
+    throw InputError("resample", "--proxy",
+                     fmt::format("the sphere does not hold the plane's rectangle: give a radius above {:.2g} m, where "
+                                 "the light comes from",
+                                 least_m));
+  return sphere_surroundings(centre_of(rectangle), radius_m);
+}
+
 Surroundings given_mesh(const std::string& file, const PlaneRectangle& rectangle) {
   auto mesh = std::make_shared<const RayScene>(read_mesh(file));
   Surroundings s =
@@ -59,7 +71,7 @@ ProxyChoice choose_proxy(const std::vector<FieldView>& views, const PlaneRectang
   if (proxy == "auto") return {find_surroundings(sweep_surroundings(views, rectangle, team), emitters), {}};
   if (proxy == "box")
     return {box_surroundings(centre_of(rectangle), fit_room(sweep_surroundings(views, rectangle, team))), {}};
-  if (const auto radius = parse_sphere(proxy)) return {sphere_surroundings(centre_of(rectangle), *radius), {}};
+  if (const auto radius = parse_sphere(proxy)) return {given_sphere(*radius, rectangle), {}};
   if (const auto box = parse_box(proxy)) return {given_box(*box, rectangle), {}};
   if (proxy.starts_with(mesh_prefix)) return {given_mesh(proxy.substr(mesh_prefix.size()), rectangle), {}};
   std::vector<SphereScore> scores = score_spheres(views, rectangle, k);

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/check.h"
+#include "common/seconds_since.h"
 #include "host/light_field/hole_filler.h"
 #include "host/light_field/light_field_writer.h"
 #include "host/light_field/panorama.h"
@@ -27,9 +28,6 @@ namespace {
 constexpr int panorama_width = 1024;  // 0.35° a pixel: finer than any cell, coarser than a camera's pixel
 
 using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 std::string options_to_json(const ResampleOptions& o, int k, const Surroundings& surroundings) {
   nlohmann::json json{{"height", o.height_m},

@@ -96,7 +96,16 @@ class Resampling {
                                               const Progress&);
 
 // The rectangle of the plane z = height (world) that the mirrors' openings cover: the box around all points that at
-// least a tenth as many views pass as the best-covered point. Nothing when no view's rays come down to the plane.
+// least a tenth as many views pass as the best-covered point; of the 4 × 4 m about the footprints' middle. Nothing when
+// no view's rays come down to the plane.
 [[nodiscard]] std::optional<PlaneRectangle> covered_rectangle(const Calibration&, const MirrorTarget&, double height_m);
+
+// `wanted` (x0 y0 x1 y1, world metres), else covered_rectangle(). Throws InputError that names `file` (of the
+// calibration), the flag and what the views cover: without a world frame or used frames, for a height far from where
+// the mirror was waved (a slip of the unit), for a rectangle that no view looks through, and for one to be found that
+// is larger than the 4 × 4 m searched.
+[[nodiscard]] PlaneRectangle chosen_rectangle(const Calibration&, const MirrorTarget&, double height_m,
+                                              const std::optional<std::array<double, 4>>& wanted,
+                                              const std::string& file);
 
 }  // namespace mf

@@ -102,7 +102,8 @@ PosedPhoto read_image_line(const ColmapLines& lines, const std::map<int, CameraM
     lines.fail("is no image: IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
   photo.name.erase(photo.name.find_last_not_of(" \t\r") + 1);
   const double length = std::sqrt(w * w + x * x + y * y + z * z);
-  if (!(std::abs(length - 1) < 1e-2) || !t.allFinite()) lines.fail("has a quaternion that is not of unit length");
+  if (!t.allFinite()) lines.fail("has a translation that is not finite: export the model again");
+  if (!(std::abs(length - 1) < 1e-2)) lines.fail("has a quaternion that is not of unit length: export the model again");
   photo.cam_from_world.rotation = Eigen::Quaterniond(w, x, y, z).normalized();
   const auto camera = cameras.find(camera_id);
   if (camera == cameras.end()) lines.fail(fmt::format("names camera {}, which cameras.txt does not have", camera_id));
@@ -171,6 +172,8 @@ PhotoSet read_colmap(const fs::path& folder) {
     files.push_back(files_of(folder, set.photos.back()));
     lines.next();  // the photo's points, which are not used
   }
+  if (set.photos.empty())
+    throw InputError((model / "images.txt").string(), "", "lists no photo: export the model again");
   set.points = read_points(model / "points3D.txt");
   read_pictures(files, set.photos);
   for (PosedPhoto& photo : set.photos)

@@ -131,7 +131,8 @@ PhotoSet read_transforms(const fs::path& path) {
 
 PhotoSet read_posed_photos(const std::filesystem::path& colmap_folder, const std::filesystem::path& transforms_file) {
   PhotoSet set = colmap_folder.empty() ? read_transforms(transforms_file) : read_colmap(colmap_folder);
-  if (set.photos.size() < 2) throw InputError(set.source, "", "holds one photo only: nothing can be interpolated");
+  if (set.photos.size() < 2)
+    throw InputError(set.source, "", "holds one photo only: add at least another to interpolate");
   return set;
 }
 

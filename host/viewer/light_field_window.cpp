@@ -16,10 +16,10 @@ namespace {
 
 class LightFieldWindow {
  public:
-  LightFieldWindow(Window& window, LightField field, std::string title)
+  LightFieldWindow(Window& window, LightFieldView& view, std::string title)
       : window_(window),
         title_(std::move(title)),
-        view_(std::move(field)),
+        view_(view),
         irradiance_exposure_(display_exposure(view_.irradiance())),
         radiance_exposure_(display_exposure(view_.hemisphere(glance_px))),
         nearest_m_(nearest_of(view_.inverse_distances(glance_px))) {}
@@ -139,7 +139,7 @@ class LightFieldWindow {
 
   Window& window_;
   std::string title_;
-  LightFieldView view_;
+  LightFieldView& view_;
   double irradiance_exposure_, radiance_exposure_;  // at 0 stops
   float nearest_m_;                                 // shown white
   float stops_ = 0;
@@ -152,8 +152,8 @@ class LightFieldWindow {
 
 }  // namespace
 
-void show_light_field(Window& window, LightField field, const std::string& title) {
-  LightFieldWindow(window, std::move(field), title).run();
+void show_light_field(Window& window, LightFieldView& view, const std::string& title) {
+  LightFieldWindow(window, view, title).run();
 }
 
 }  // namespace mf

@@ -11,6 +11,6 @@ namespace mf {
 // Shows a light field until the window is closed: the plane's irradiance, on which the probe point is dragged, and what
 // the point sees: the hemisphere, the distances of the surroundings, the panorama (docs/viewer.md). `title` is the
 // window's line of text about the field.
-void show_light_field(Window&, LightField, const std::string& title);
+void show_light_field(Window&, LightFieldView&, const std::string& title);
 
 }  // namespace mf

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "common/error.h"
+#include "common/seconds_since.h"
 #include "host/viewer/drawing.h"
 #include "host/viewer/path_recorder.h"
 
@@ -238,7 +239,7 @@ class LumigraphWindow {
       const auto start = std::chrono::steady_clock::now();
       const View view = view_.view(std::max(1, full_width() / divisor));
       picture_.set(view_.render(view, static_cast<double>(stops_)), ShownPicture::Enlarged::smooth);
-      pace_.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), divisor);
+      pace_.took(seconds_since(start), divisor);
       full_size_waits_ = divisor > 1;
       rendered_width_ = full_width();
       if (full_size_waits_) window_.hurry();
