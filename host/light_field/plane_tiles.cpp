@@ -9,6 +9,12 @@
 
 namespace mf {
 
+namespace {
+
+constexpr float slack = 0.95F;  // between the vertices a threshold may be less than at any of them
+
+}  // namespace
+
 void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int block_y, int n,
                  Eigen::Vector4f* tile) {
   const int columns = std::min(block_side, n - block_x * block_side),
@@ -51,7 +57,8 @@ void PlaneTiles::find_thresholds(std::span<const std::size_t> directions) {
   for (std::size_t y = 0; y <= blocks; ++y)
     for (std::size_t x = 0; x <= blocks; ++x)
       for (Wanted& w : wanted_) {
-        const float here = inverse_threshold_at(views_.vertex(static_cast<int>(x), static_cast<int>(y)), w.direction);
+        const float here =
+            slack * inverse_threshold_at(views_.vertex(static_cast<int>(x), static_cast<int>(y)), w.direction);
         for (std::size_t by = y - std::min<std::size_t>(y, 1); by <= std::min(y, blocks - 1); ++by)
           for (std::size_t bx = x - std::min<std::size_t>(x, 1); bx <= std::min(x, blocks - 1); ++bx) {
             float& least = w.least_thresholds[by * blocks + bx];

@@ -13,12 +13,12 @@ namespace mf {
 namespace {
 
 constexpr int block_vertices = block_side / vertex_step;
-constexpr std::size_t spare_views = 4;  // ranked beyond k, so that the k best of any texel are among its corners' lists
+constexpr std::size_t spare_views = 2;  // ranked beyond k, so that the k best of any texel are among its corners' lists
 constexpr std::size_t spare_views_near_emitter = 26;  // there many views have no say
 constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
 constexpr float same_ray = 1e-4F;                     // rays closer than this are the same
-constexpr float largest_jump = 0.1F;                  // of the cell, see is_rough()
-constexpr float largest_bend = 0.1F;                  // of what is seen, see is_smooth()
+constexpr float largest_jump = 0.3F;                  // of the cell, see is_rough()
+constexpr float largest_bend = 0.2F;                  // of what is seen, see is_smooth()
 constexpr int outline_points = 3;                     // along a side: where it is tested who looks that way
 constexpr float outline_margin = 0.3F;                // of the outline's size, for what lies between those points
 
