@@ -165,8 +165,8 @@ LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& opt
   check(!options.validate(), "the lumigraph's options are valid");
   const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
   const CandidateViews may_speak = speaking(views);
-  const TileFrame frame{view,      proxy_,    options, visibility_.tolerance,
-                        answering, may_speak, resolution_of(view, may_speak)};
+  const TileFrame frame{
+      view, proxy_, options, visibility_.tolerance, answering, may_speak, resolution_of(view, may_speak)};
   const int width = view.camera.width;
   const int height = view.camera.height;
   LumigraphPicture result{ImageU8(), ImageU8(width, height, 1)};
@@ -201,8 +201,8 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
       if (const float weight = chosen.weight[row * chosen.row_length]; weight > 0)
         weights.push_back({chosen.view[row * chosen.row_length], weight});
   };
-  const TileFrame frame{one,       proxy_,    options, visibility_.tolerance,
-                        answering, may_speak, resolution_of(view, may_speak)};
+  const TileFrame frame{
+      one, proxy_, options, visibility_.tolerance, answering, may_speak, resolution_of(view, may_speak)};
   TileRenderer(frame, pool_->local(), take).render(0, 0);
   return weights;
 }

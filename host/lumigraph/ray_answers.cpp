@@ -16,8 +16,8 @@ namespace {
 constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr float nearest = 1e-3F;  // of the depth in the new view: points nearer to a photo's camera plane are not in it
 
-// Octaves by which a bilinear fetch blurs more than a pixel of its texels' size does. Such a pixel is a box, of variance
-// 1/12; a texel is one too, and interpolation adds 1/6 on average: log₂ √3.
+// Octaves by which a bilinear fetch blurs more than a pixel of its texels' size does. Such a pixel is a box, of
+// variance 1/12; a texel is one too, and interpolation adds 1/6 on average: log₂ √3.
 constexpr float fetch_octaves = 0.7925F;
 
 // By value: the references of std::min and std::max keep a loop from being vectorized.

@@ -23,8 +23,8 @@ struct RayBundle {                    // at most largest_bundle rays
   std::span<const float> dx, dy, dz;  // world
   std::span<const float> depth;       // finite
   std::span<const float> nx, ny, nz;  // the proxy's normal at X, unit length, either side
-  float focal2 = 1;  // fx · fy, px², of the new view, or of the finest photo if that is less
-  float beyond = 0;  // octaves by which the new view is finer than that
+  float focal2 = 1;                   // fx · fy, px², of the new view, or of the finest photo if that is less
+  float beyond = 0;                   // octaves by which the new view is finer than that
 };
 
 // What of a photo stays the same from view to view.

@@ -86,10 +86,7 @@ RayBundle TileRays::bundle(std::size_t first, std::size_t count, const WantedRes
 }
 
 TileRenderer::TileRenderer(const TileFrame& frame, TileBuffers& buffers, const TakeChosen& take)
-    : frame_(frame),
-      buffers_(buffers),
-      take_(take),
-      plain_camera_(!frame.view.camera.has_distortion()) {
+    : frame_(frame), buffers_(buffers), take_(take), plain_camera_(!frame.view.camera.has_distortion()) {
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   buffers.least_penalty.resize(entries);
   buffers.least_candidate.resize(entries);

@@ -11,8 +11,8 @@ namespace fs = std::filesystem;
 
 const fs::path cube = fs::path(MF_SHARED_DATA) / "cube";
 
-// Real photos, half size, k = 4: an earlier implementation of others had 29.48 dB, its nearest photo alone 28.04 dB, through
-// a filter that blurs more.
+// Real photos, half size, k = 4: an earlier implementation of others had 29.48 dB, its nearest photo alone 28.04 dB,
+// through a filter that blurs more.
 TEST(LumigraphOfACube, ForetellsLeftOutPhotos) {
   if (!fs::exists(cube)) GTEST_SKIP() << cube << " is absent";
   const PhotoSet set = scaled(read_colmap(cube), 0.5);
