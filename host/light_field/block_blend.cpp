@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "host/blending/vectorized.h"
 #include "host/blending/view_weights.h"
-#include "host/light_field/vectorized.h"
 
 namespace mf {
 

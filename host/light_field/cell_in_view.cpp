@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "common/check.h"
-#include "host/light_field/vectorized.h"
+#include "host/blending/vectorized.h"
 
 namespace mf {
 

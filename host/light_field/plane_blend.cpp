@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/blending/vectorized.h"
 #include "host/blending/view_weights.h"
 #include "host/light_field/half_floats.h"
-#include "host/light_field/vectorized.h"
 
 namespace mf {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "host/light_field/vectorized.h"
+#include "host/blending/vectorized.h"
 
 namespace mf {
 

@@ -5,9 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "host/blending/vectorized.h"
+
 // The loops over rays are written for the compiler's vectorizer: no branch but selections, no call. (This file is
 // compiled with -fno-math-errno, -fno-trapping-math and -fno-thread-jumps, without which they stay scalar.)
-#define MF_VECTORIZED __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 
 namespace mf {
 
