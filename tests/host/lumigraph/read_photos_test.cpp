@@ -75,7 +75,7 @@ TEST_F(ColmapFolder, FaultsAreNamed) {
   images("1 1 0 0 0 0 0 2 1 gone.png\n\n");
   EXPECT_TRUE(contains(error(), "gone.png"));
   images("");
-  EXPECT_TRUE(contains(error(), "holds no photo"));
+  EXPECT_TRUE(contains(error(), "lists no photo"));
   fs::remove_all(folder_ / "sparse");
   EXPECT_TRUE(contains(error(), "cameras.txt: is missing"));
 }

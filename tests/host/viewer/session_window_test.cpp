@@ -59,8 +59,9 @@ TEST_F(SessionWindow, NamesWhatASessionLacks) {
   test::write_session(folder_ / "no_frame", test::looking_down({}));
   test::write_session(folder_ / "uncalibrated", calibration);
   std::filesystem::remove(folder_ / "uncalibrated" / "calibration.json");
-  for (const auto& [session, word] :
-       {std::pair{"no_world", "cam_from_world"}, {"no_frame", "--height"}, {"uncalibrated", "mirrorfield calibrate"}}) {
+  for (const auto& [session, word] : {std::pair{"no_world", "cam_from_world"},
+                                      {"no_frame", "has no used frame"},
+                                      {"uncalibrated", "mirrorfield calibrate"}}) {
     const test::CommandOutcome outcome = test::run_command({mirrorfield, "view", folder_ / session});
     EXPECT_EQ(outcome.exit_code, 1);
     EXPECT_EQ(outcome.error_lines(), 1) << outcome.err;
