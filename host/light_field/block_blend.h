@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 
 namespace mf {

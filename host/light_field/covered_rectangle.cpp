@@ -150,7 +150,7 @@ PlaneRectangle chosen_rectangle(const Calibration& calibration, const MirrorTarg
   const std::string waved =
       fmt::format("the mirror was waved {:.2f} to {:.2f} m above the ground", sweep->lowest_m, sweep->highest_m);
   const double reach_m = farthest_plane * sweep->from_camera_m;
-  if (height_m > sweep->highest_m + reach_m || height_m < sweep->lowest_m - reach_m)
+  if (!(height_m <= sweep->highest_m + reach_m && height_m >= sweep->lowest_m - reach_m))  // nor is NaN one
     throw InputError(
         file, "--height",
         fmt::format("{:g} m is no place for the plane: {}; give a height near that, in metres", height_m, waved));

@@ -217,6 +217,7 @@ bool Worker::add_emitters(std::uint32_t cell, float share, PlaneTile& emitted) {
 // With the plane as proxy a point of it is one pixel of a view for all directions: the views are warped onto it once.
 std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const LightField& focused, int k,
                                       std::span<const TileRequest> requests, int most_texels) {
+  constexpr std::size_t cells_at_once = 32;  // of a request that may be all of the hemisphere
   LightField part;
   part.plane = focused.plane;
   part.directions = focused.directions;
@@ -231,15 +232,18 @@ std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const
     tile = {part.plane.min_m.cast<float>(), part.plane.max_m.cast<float>(), part.resolution, part.resolution, {}};
     tile.texels.assign(part.texel_count(), Eigen::Vector4f::Zero());
     const std::vector<std::size_t> cells(requests[i].cells.begin(), requests[i].cells.end());
-    std::vector<Eigen::Vector4f> of_cells(cells.size() * part.texel_count());
-    resamplers.local().fill(cells, of_cells.data());
+    std::vector<Eigen::Vector4f> of_cells(std::min(cells_at_once, cells.size()) * part.texel_count());
     float solid_angle = 0;
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      Eigen::Vector4f* of_cell = of_cells.data() + c * part.texel_count();
-      filler.fill(cells[c], of_cell);
-      solid_angle += part.directions.solid_angles_sr[cells[c]];
-      for (std::size_t t = 0; t < part.texel_count(); ++t)
-        tile.texels[t] += part.directions.solid_angles_sr[cells[c]] * of_cell[t];
+    for (std::size_t first = 0; first < cells.size(); first += cells_at_once) {
+      const auto some = std::span(cells).subspan(first, std::min(cells_at_once, cells.size() - first));
+      resamplers.local().fill(some, of_cells.data());
+      for (std::size_t c = 0; c < some.size(); ++c) {
+        Eigen::Vector4f* of_cell = of_cells.data() + c * part.texel_count();
+        filler.fill(some[c], of_cell);
+        solid_angle += part.directions.solid_angles_sr[some[c]];
+        for (std::size_t t = 0; t < part.texel_count(); ++t)
+          tile.texels[t] += part.directions.solid_angles_sr[some[c]] * of_cell[t];
+      }
     }
     for (Eigen::Vector4f& texel : tile.texels) texel /= solid_angle;
   });

@@ -143,8 +143,10 @@ void Resampling::fill(std::span<const std::size_t> directions, Eigen::Vector4f* 
 }
 
 std::size_t Resampling::directions_at_once() const {
-  constexpr std::size_t on_plane = 32;  // what views show of a block is read once for all of them
-  return impl_->plane_tiles ? on_plane : 1;
+  if (!impl_->plane_tiles) return 1;
+  constexpr std::size_t most = 32;                          // what views show of a block is read once for all of them
+  constexpr std::size_t texels_at_hand = most * 128 * 128;  // 8 MB a thread, however large the tiles
+  return std::clamp(texels_at_hand / impl_->field.texel_count(), std::size_t{1}, most);
 }
 
 Provenance Resampling::provenance(std::vector<std::string> frame_names) const {

@@ -11,6 +11,7 @@
 #include <numeric>
 
 #include "common/check.h"
+#include "host/blending/vectorized.h"
 #include "host/lumigraph/proxy_rays.h"
 #include "host/lumigraph/ray_answers.h"
 #include "host/lumigraph/tile_renderer.h"
@@ -53,9 +54,8 @@ inline __attribute__((always_inline)) void blend(const ChosenViews& chosen, Imag
   }
 }
 
-__attribute__((target_clones("arch=x86-64-v3", "default"))) void blend_photos(
-    const ChosenViews& chosen, const std::vector<PhotoPyramid<std::uint8_t>>& photos, ImageU8& picture,
-    ImageU8& covered) {
+MF_VECTORIZED void blend_photos(const ChosenViews& chosen, const std::vector<PhotoPyramid<std::uint8_t>>& photos,
+                                ImageU8& picture, ImageU8& covered) {
   blend(chosen, picture, covered,
         [&photos](std::uint32_t view, float x, float y, float lod) { return photos[view].sample(x, y, lod); });
 }
