@@ -167,7 +167,7 @@ const std::vector<BadInput> bad_pictures{
      },
      rgb_float},
     {"infinite_value",
-     "frames/00002.exr: pixel (3, 4): is inf",
+     "frames/00002.exr: pixel (3, 4), channel 1: is infinite",
      {},
      picture("frames/00002.exr", with_infinity()),
      rgb_float},
