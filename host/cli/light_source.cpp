@@ -28,10 +28,12 @@ std::vector<double> light_of_capture(const Capture& capture, const Bounds& objec
   const LightField& field = capture.focused;
   if (!field.surroundings.panorama.empty()) return light_on(field, object);
   std::vector<TileRequest> requests;
+  requests.reserve(field.directions.size());
   for (std::uint32_t i = 0; i < field.directions.size(); ++i)
     requests.push_back({{i}, field.plane.min_m.cast<float>(), field.plane.max_m.cast<float>()});
   const std::vector<PlaneTile> tiles = resample_just_in_time(capture.views, field, capture.penalty, requests, {});
   std::vector<PlaneImage> images;
+  images.reserve(tiles.size());
   for (const PlaneTile& tile : tiles) images.push_back(tile.image());
   return light_of_tiles(field.directions, images);
 }

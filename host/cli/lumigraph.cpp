@@ -241,8 +241,9 @@ void check_proxy_is_seen(const Lumigraph& lumigraph, const LumigraphArguments& a
   constexpr int steps = 8;
   for (const Lumigraph::Source& source : lumigraph.sources())
     for (int i = 0; i < steps * steps; ++i) {
-      const Eigen::Vector2d pixel((i % steps + 0.5) / steps * source.camera.width,
-                                  (i / steps + 0.5) / steps * source.camera.height);
+      const int column = i % steps, row = i / steps;
+      const Eigen::Vector2d pixel((column + 0.5) / steps * source.camera.width,
+                                  (row + 0.5) / steps * source.camera.height);
       if (lumigraph.point_at({source.camera, source.cam_from_world}, pixel)) return;
     }
   throw InputError("--proxy", a.proxy,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/error.h"
 #include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/peak_memory.h"

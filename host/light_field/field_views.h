@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/camera_model.h"
+#include "common/luminance.h"
 #include "common/progress.h"
 #include "common/response_curve.h"
 #include "common/session.h"
@@ -85,7 +86,7 @@ class PremultipliedImage {
 // Luminance (Rec. 709) of what a premultiplied texel or window shows; 0 where nothing does.
 [[nodiscard]] inline float shown_luminance(const Eigen::Vector4f& premultiplied) {
   if (premultiplied.w() <= 0) return 0;
-  return (0.2126F * premultiplied.x() + 0.7152F * premultiplied.y() + 0.0722F * premultiplied.z()) / premultiplied.w();
+  return luminance_of(premultiplied.head<3>()) / premultiplied.w();
 }
 
 // One mirror frame as a captured view: radiance in the mirror's opening, ready to be looked up from the world.

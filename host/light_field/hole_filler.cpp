@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "common/luminance.h"
+
 namespace mf {
 
 namespace {
@@ -17,10 +19,6 @@ Eigen::Map<Eigen::Vector4f> pixel(ImageF& image, int x, int y) {
 }
 Eigen::Map<const Eigen::Vector4f> pixel(const ImageF& image, int x, int y) {
   return Eigen::Map<const Eigen::Vector4f>(&image.at(x, y));
-}
-
-float luminance_of(const Eigen::Vector4f& c) {
-  return 0.2126F * c.x() + 0.7152F * c.y() + 0.0722F * c.z();
 }
 
 // Half the size; colours not multiplied by the weight, which saturates at 1 (a coarse pixel is known when one part is).
@@ -58,14 +56,14 @@ void cap_lamps(ImageF& rgbw) {
   std::vector<float> known;
   for (int y = 0; y < rgbw.height; ++y)
     for (int x = 0; x < rgbw.width; ++x)
-      if (rgbw.at(x, y, 3) > 0) known.push_back(luminance_of(pixel(rgbw, x, y)));
+      if (rgbw.at(x, y, 3) > 0) known.push_back(luminance_of(pixel(rgbw, x, y).head<3>()));
   if (known.empty()) return;
   const auto middle = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
   std::nth_element(known.begin(), middle, known.end());
   const float most = brightest_guess * *middle;
   for (int y = 0; y < rgbw.height; ++y)
     for (int x = 0; x < rgbw.width; ++x) {
-      const float luminance = luminance_of(pixel(rgbw, x, y));
+      const float luminance = luminance_of(pixel(rgbw, x, y).head<3>());
       if (luminance > most) pixel(rgbw, x, y).head<3>() *= most / luminance;
     }
 }

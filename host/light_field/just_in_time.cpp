@@ -55,50 +55,51 @@ PlaneTile even_tile(const Rectangle& r, int texels) {
 }
 
 // Where the light field draws its emitters: at every fourth corner of its texels, counted from its top left.
-struct EmitterVertices {
-  int left, top, right, bottom;  // the first and last corners, in steps
-
-  EmitterVertices(const LightField& field, const Rectangle& r) {
-    const Eigen::Array2f step = step_of(field);
-    const Eigen::Array2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
-    left = static_cast<int>(std::floor((r.min_m.x() - low.x()) / step.x()));
-    right = std::max(left + 1, static_cast<int>(std::ceil((r.max_m.x() - low.x()) / step.x())));
-    top = static_cast<int>(std::floor((high.y() - r.max_m.y()) / step.y()));
-    bottom = std::max(top + 1, static_cast<int>(std::ceil((high.y() - r.min_m.y()) / step.y())));
+class EmitterVertices {
+ public:
+  EmitterVertices(const LightField& field, const Rectangle& r)
+      : low_(field.plane.min_m.cast<float>()),
+        high_(field.plane.max_m.cast<float>()),
+        step_(field.plane.size_m().cast<float>().array() *
+              (static_cast<float>(emitter_step) / static_cast<float>(field.resolution))),
+        texel_(step_ / static_cast<float>(emitter_step)),
+        resolution_(field.resolution) {
+    left_ = static_cast<int>(std::floor((r.min_m.x() - low_.x()) / step_.x()));
+    right_ = std::max(left_ + 1, static_cast<int>(std::ceil((r.max_m.x() - low_.x()) / step_.x())));
+    top_ = static_cast<int>(std::floor((high_.y() - r.max_m.y()) / step_.y()));
+    bottom_ = std::max(top_ + 1, static_cast<int>(std::ceil((high_.y() - r.min_m.y()) / step_.y())));
   }
 
-  static Eigen::Array2f step_of(const LightField& field) {
-    return field.plane.size_m().cast<float>().array() *
-           (static_cast<float>(emitter_step) / static_cast<float>(field.resolution));
-  }
   // An empty tile whose texel centres are the vertices.
-  [[nodiscard]] PlaneTile tile(const LightField& field) const {
-    const Eigen::Array2f step = step_of(field);
-    const Eigen::Array2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
+  [[nodiscard]] PlaneTile tile() const {
     const auto at = [](int corner, float side) { return static_cast<float>(corner) + side; };
     PlaneTile tile;
-    tile.min_m = {low.x() + at(left, -0.5F) * step.x(), high.y() - at(bottom, 0.5F) * step.y()};
-    tile.max_m = {low.x() + at(right, 0.5F) * step.x(), high.y() - at(top, -0.5F) * step.y()};
-    tile.width = right - left + 1;
-    tile.height = bottom - top + 1;
+    tile.min_m = {low_.x() + at(left_, -0.5F) * step_.x(), high_.y() - at(bottom_, 0.5F) * step_.y()};
+    tile.max_m = {low_.x() + at(right_, 0.5F) * step_.x(), high_.y() - at(top_, -0.5F) * step_.y()};
+    tile.width = right_ - left_ + 1;
+    tile.height = bottom_ - top_ + 1;
     tile.texels.assign(static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height),
                        Eigen::Vector4f::Zero());
     return tile;
   }
   // The light field's own texels between the vertices, empty.
-  [[nodiscard]] PlaneTile texels(const LightField& field) const {
-    const Eigen::Array2f texel = step_of(field) / static_cast<float>(emitter_step);
-    const Eigen::Array2f low = field.plane.min_m.cast<float>(), high = field.plane.max_m.cast<float>();
-    const int x0 = emitter_step * left, x1 = std::min(emitter_step * right, field.resolution);
-    const int y0 = emitter_step * top, y1 = std::min(emitter_step * bottom, field.resolution);
+  [[nodiscard]] PlaneTile texels() const {
+    const int x0 = emitter_step * left_, x1 = std::min(emitter_step * right_, resolution_);
+    const int y0 = emitter_step * top_, y1 = std::min(emitter_step * bottom_, resolution_);
     PlaneTile tile;
-    tile.min_m = {low.x() + static_cast<float>(x0) * texel.x(), high.y() - static_cast<float>(y1) * texel.y()};
-    tile.max_m = {low.x() + static_cast<float>(x1) * texel.x(), high.y() - static_cast<float>(y0) * texel.y()};
+    tile.min_m = {low_.x() + static_cast<float>(x0) * texel_.x(), high_.y() - static_cast<float>(y1) * texel_.y()};
+    tile.max_m = {low_.x() + static_cast<float>(x1) * texel_.x(), high_.y() - static_cast<float>(y0) * texel_.y()};
     tile.width = x1 - x0;
     tile.height = y1 - y0;
     tile.texels.resize(static_cast<std::size_t>(tile.width) * static_cast<std::size_t>(tile.height));
     return tile;
   }
+
+ private:
+  Eigen::Array2f low_, high_;    // of the plane's rectangle
+  Eigen::Array2f step_, texel_;  // metres
+  int resolution_;
+  int left_, top_, right_, bottom_;  // the first and last corners, in steps
 };
 
 // One thread's working memory: a light field of few texels, whose rectangle is the request's.
@@ -125,7 +126,7 @@ class Worker {
     part_.resolution = texels_for(where);
     PlaneTile smooth = even_tile(where, part_.resolution);
     const EmitterVertices vertices(focused_, where);
-    PlaneTile emitted = vertices.tile(focused_);
+    PlaneTile emitted = vertices.tile();
     of_cell_ = smooth;
     part_.plane = {focused_.plane.world_from_plane, smooth.min_m.cast<double>(), smooth.max_m.cast<double>()};
     TileResampler resampler(views_, part_, dark_, penalty_);
@@ -140,7 +141,7 @@ class Worker {
       any_emitter = add_emitters(cell, share, emitted) || any_emitter;
     }
     if (!any_emitter) return smooth;
-    PlaneTile both = vertices.texels(focused_);
+    PlaneTile both = vertices.texels();
     for (int y = 0; y < both.height; ++y)
       for (int x = 0; x < both.width; ++x) {
         const Eigen::Vector2f at = both.position(x, y);

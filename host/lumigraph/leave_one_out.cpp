@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/check.h"
+#include "common/luminance.h"
 
 namespace mf {
 
@@ -24,10 +25,9 @@ ImageF luma_of(const Picture& picture, float largest) {
       [&](const auto& image) {
         ImageF luma(image.width, image.height, 1);
         for (std::size_t i = 0; i < luma.data.size(); ++i)
-          luma.data[i] =
-              (0.2126F * static_cast<float>(image.data[3 * i]) + 0.7152F * static_cast<float>(image.data[3 * i + 1]) +
-               0.0722F * static_cast<float>(image.data[3 * i + 2])) /
-              largest;
+          luma.data[i] = luminance_of({static_cast<float>(image.data[3 * i]), static_cast<float>(image.data[3 * i + 1]),
+                                       static_cast<float>(image.data[3 * i + 2])}) /
+                         largest;
         return luma;
       },
       picture);

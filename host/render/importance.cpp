@@ -14,14 +14,11 @@
 #include <queue>
 
 #include "common/check.h"
+#include "common/luminance.h"
 
 namespace mf {
 
 namespace {
-
-float luminance(const Eigen::Vector3f& rgb) {
-  return 0.2126F * rgb[0] + 0.7152F * rgb[1] + 0.0722F * rgb[2];
-}
 
 // ---- what each cell brings ----
 
@@ -35,7 +32,7 @@ double light_of_surroundings(const LightField& field, const Eigen::Vector3f& x, 
   for (const CellSample& part : split_cell(field.directions, cell, 0)) {
     const Eigen::Vector3f seen_from_centre = (world_from_plane * part.direction + parallax).normalized();
     const Eigen::Vector4f colour = s.panorama_at(seen_from_centre);
-    if (colour.w() > 0) sum += static_cast<double>(part.solid_angle_sr * luminance(colour.head<3>()));
+    if (colour.w() > 0) sum += static_cast<double>(part.solid_angle_sr * luminance_of(colour.head<3>()));
   }
   return std::max(0., sum);
 }
@@ -74,7 +71,7 @@ class EmitterLight {
       const DirectionWeights w = locator_.locate(d);
       const auto nearest =
           static_cast<std::size_t>(std::max_element(w.weight.begin(), w.weight.end()) - w.weight.begin());
-      light[w.index[nearest]] += static_cast<double>(weight * visible.value_or(1) * luminance(e.radiance));
+      light[w.index[nearest]] += static_cast<double>(weight * visible.value_or(1) * luminance_of(e.radiance));
     }
   }
 
@@ -173,7 +170,7 @@ std::vector<double> light_of_tiles(const DirectionSet& set, std::span<const Plan
   tbb::parallel_for(std::size_t{0}, light.size(), [&](std::size_t i) {
     double sum = 0;
     for (const Eigen::Vector4f& texel : std::span(tiles[i].texels, tiles[i].texel_count()))
-      sum += static_cast<double>(luminance(texel.head<3>()));
+      sum += static_cast<double>(luminance_of(texel.head<3>()));
     light[i] =
         std::max(0., sum / static_cast<double>(tiles[i].texel_count())) * static_cast<double>(set.solid_angles_sr[i]);
   });

@@ -47,6 +47,7 @@ void write_path(const std::filesystem::path& file, const std::vector<View>& keys
 // Runs a program of PATH without a word on the terminal; 0 when there is none.
 pid_t spawn_quietly(const std::vector<std::string>& arguments) {
   std::vector<char*> raw;
+  raw.reserve(arguments.size() + 1);
   for (const std::string& argument : arguments) raw.push_back(const_cast<char*>(argument.c_str()));  // POSIX's type
   raw.push_back(nullptr);
   posix_spawn_file_actions_t files;

@@ -30,6 +30,7 @@
 #endif
 
 #include "common/homography.h"
+#include "common/luminance.h"
 #include "host/calibration/calibration.h"
 #include "host/io/mesh.h"
 #include "host/light_field/emitters.h"
@@ -64,7 +65,7 @@ struct Score {
 };
 
 float log2_luminance(const Eigen::Vector3f& c) {
-  return std::log2(std::max(c.dot(Eigen::Vector3f(0.2126F, 0.7152F, 0.0722F)), 1e-4F));
+  return std::log2(std::max(luminance_of(c), 1e-4F));
 }
 
 Score score_of(const std::vector<FieldView>& views, const Surroundings& surroundings,

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The whole path, from a simulated recording to a lit picture, with the programs that users run. Truth is the
 // simulator's: poses, camera, and a path-traced picture of scene and object together.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/file_bytes.h"
@@ -165,11 +167,50 @@ TEST(JustInTime, SaysInOneLineWhatIsWrongWithASession) {
   refuses(p.session, {"--directions", "0"}, "--directions");
   refuses(p.session, {"--proxy", "cube"}, "--proxy");
   refuses(p.session, {"--height", "nan"}, "--height");
+  refuses(p.session, {"--height", "50"}, "the mirror was waved");
   refuses(p.out + "/field.lf.exr", {"--proxy", "plane"}, "--proxy");
   const std::string uncalibrated = p.folder / "uncalibrated";
   ASSERT_EQ(run_command({mirrorfield, "import", p.capture, "-o", uncalibrated}).exit_code, 0);
   fs::copy(p.session + "/response.json", uncalibrated);
   refuses(uncalibrated, {}, "calibrate");
+}
+
+// Neither a black picture nor an unchanged plate, and no probe of what nobody saw.
+TEST(Pictures, ThatWouldShowNothingAreRefused) {
+  const Processed& p = processed();
+  ASSERT_EQ(p.process.exit_code, 0) << p.process.err;
+  const std::string field = p.out + "/field.lf.exr";
+  const std::string picture = p.out + "/nothing.exr";
+  const auto refuses = [&](std::vector<std::string> command, const std::string& word) {
+    command.insert(command.begin(), mirrorfield);
+    command.insert(command.end(), {"-o", picture});
+    const CommandOutcome outcome = run_command(command);
+    EXPECT_EQ(outcome.exit_code, 1) << word;
+    EXPECT_EQ(outcome.error_lines(), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
+    EXPECT_FALSE(fs::exists(picture)) << word;
+  };
+  const auto tetrahedron = [&](const char* name, double x, double z) {
+    std::string file = p.folder / name;
+    std::ofstream(file) << fmt::format("v {0} 0 {1}\nv {2} 0 {1}\nv {0} 0.02 {1}\nv {0} 0 {3}\n", x, z, x + 0.02,
+                                       z + 0.02)
+                        << "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    return file;
+  };
+  const std::string aside = tetrahedron("aside.obj", 20, 0.1), below = tetrahedron("below.obj", 0, -0.1);
+  const std::string views = p.truth + "/views.json", plate = p.truth + "/plate0.exr";
+  const std::vector<std::string> quick{"--cameras", views, "--directions", "50"};
+  for (const auto& [object, word] : {std::pair{aside, "shows nothing of"}, {below, "lies wholly below"}}) {
+    std::vector<std::string> command{"render", field, object};
+    command.insert(command.end(), quick.begin(), quick.end());
+    refuses(command, word);
+    command.front() = "composite";
+    command.insert(command.end(), {"--plate", plate});
+    refuses(command, word);
+  }
+  refuses({"probe", field, "--at", "0", "0", "100"}, "100 m from the light field's plane");
+  refuses({"probe", field, "--at", "0", "0", "-5"}, "no view saw what arrives there");
+  refuses({"probe", p.session, "--at", "0", "0", "0.1"}, "mirrorfield resample");
 }
 
 TEST(Process, SaysInOneLineWhatIsMissing) {

@@ -95,6 +95,9 @@ TEST(Exr, BadFilesAreOneLineThatNamesThem) {
   image.at(4, 2, 1) = std::numeric_limits<float>::quiet_NaN();
   write_exr(folder / "nan.exr", image);
   EXPECT_TRUE(contains(error("nan.exr"), "nan.exr: pixel (4, 2), channel 1: is not a number"));
+  image.at(4, 2, 1) = std::numeric_limits<float>::infinity();
+  write_exr(folder / "inf.exr", image);
+  EXPECT_TRUE(contains(error("inf.exr"), "inf.exr: pixel (4, 2), channel 1: is infinite"));
 }
 
 TEST(Exr, AFailedWriteLeavesNothing) {

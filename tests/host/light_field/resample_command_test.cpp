@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "common/file_bytes.h"
@@ -41,6 +42,31 @@ TEST_F(ResampleCommand, TellsTheProxyTheSecondsAndTheMemory) {
   for (const char* stage : {"loading", "focusing", "blending", "packing", "writing"})
     stages += summary.at("seconds").at(stage).get<double>();
   EXPECT_GT(summary.at("seconds").at("total").get<double>(), 0.5 * stages);
+}
+
+// Nothing is written, and one line says what is wrong.
+TEST_F(ResampleCommand, RefusesWhatWouldBeNoLightField) {
+  const auto refuses = [&](std::vector<std::string> options, const std::string& word) {
+    options.insert(options.begin(), {MF_BINARY_DIR "/mirrorfield", "resample", folder_ / "S"});
+    const test::CommandOutcome outcome = test::run_command(options);
+    EXPECT_EQ(outcome.exit_code, 1) << word;
+    EXPECT_EQ(outcome.error_lines(), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_.path()))
+      EXPECT_EQ(entry.path().filename(), "S") << word;
+  };
+  const std::string file = folder_ / "f.lf.exr";
+  refuses({"-o", folder_ / "f.png"}, "must end in .exr");
+  refuses({"-o", folder_ / "none/f.lf.exr"}, "is no folder");
+  refuses({"-o", file, "-k", "65"}, ": -k: ");
+  refuses({"-o", file, "--height", "80000"}, "--height: 80000 m is no place");
+  refuses({"-o", file, "--rectangle", "100", "100", "101", "101"}, "--rectangle: no mirror view");
+  refuses({"-o", file, "--proxy", "sphere:0.01"}, "does not hold the plane's rectangle");
+  const std::filesystem::path calibration = folder_ / "S/calibration.json";
+  nlohmann::json json = nlohmann::json::parse(read_file_bytes(calibration));
+  for (std::size_t i = 1; i < json.at("frames").size(); ++i) json["frames"][i]["used"] = false;
+  std::ofstream(calibration) << json;
+  refuses({"-o", file}, "has one used frame only");
 }
 
 // Ranks deal out the frames, the rows of the focusing and the directions: the file is that of one process, bit for bit.

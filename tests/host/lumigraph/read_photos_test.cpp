@@ -72,10 +72,14 @@ TEST_F(ColmapFolder, FaultsAreNamed) {
   EXPECT_TRUE(contains(error(), "images.txt: line 3: names camera 2"));
   images("1 1 0 0 0.5 0 0 2 1 a.png\n");
   EXPECT_TRUE(contains(error(), "line 1: has a quaternion that is not of unit length"));
+  images("1 0 0 0 0 0 0 2 1 a.png\n");
+  EXPECT_TRUE(contains(error(), "line 1: has a quaternion that is not of unit length: export the model again"));
+  images("1 1 0 0 0 0 nan 2 1 a.png\n");
+  EXPECT_TRUE(contains(error(), "images.txt: line 1: "));
   images("1 1 0 0 0 0 0 2 1 gone.png\n\n");
   EXPECT_TRUE(contains(error(), "gone.png"));
   images("");
-  EXPECT_TRUE(contains(error(), "lists no photo"));
+  EXPECT_TRUE(contains(error(), "images.txt: lists no photo"));
   fs::remove_all(folder_ / "sparse");
   EXPECT_TRUE(contains(error(), "cameras.txt: is missing"));
 }

@@ -90,7 +90,11 @@ TEST_F(SceneInput, BadMeshesAreNamed) {
   const auto empty = write("empty.obj", "# nothing\n");
   EXPECT_NE(problem([&] { (void)read_mesh(empty); }).find("empty.obj"), std::string::npos);
   const auto points = write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
-  EXPECT_NE(problem([&] { (void)read_mesh(points); }).find("points.obj"), std::string::npos);
+  EXPECT_NE(problem([&] { (void)read_mesh(points); }).find("points.obj: holds no triangle"), std::string::npos);
+  for (const char* face : {"1 2 9", "1 2 -9", "0 1 2"}) {
+    const auto beyond = write("beyond.obj", std::string("v 0 0 0\nv 1 0 0\nv 0 1 0\nf ") + face + "\n");
+    EXPECT_NE(problem([&] { (void)read_mesh(beyond); }).find("export it again"), std::string::npos) << face;
+  }
   const auto flat = write("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
   EXPECT_NE(problem([&] { (void)read_mesh(flat); }).find("holds no triangle"), std::string::npos);
   const auto nan = write("nan.obj", "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");

@@ -67,6 +67,16 @@ TEST_F(SessionWindow, NamesWhatASessionLacks) {
     EXPECT_EQ(outcome.error_lines(), 1) << outcome.err;
     EXPECT_NE(outcome.err.find(word), std::string::npos) << outcome.err;
   }
+  test::write_session(folder_ / "good", test::looking_down({{0, 0}, {0.1, 0}}));
+  for (const std::vector<std::string>& what :
+       {std::vector<std::string>{folder_ / "good", "--height", "300"}, {"--session", folder_ / "uncalibrated"}}) {
+    std::vector<std::string> command{mirrorfield, "view"};
+    command.insert(command.end(), what.begin(), what.end());
+    const test::CommandOutcome outcome = test::run_command(command);
+    EXPECT_EQ(outcome.exit_code, 1);
+    EXPECT_EQ(outcome.error_lines(), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("calibration.json"), std::string::npos) << outcome.err;
+  }
 }
 
 }  // namespace
