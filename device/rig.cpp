@@ -9,6 +9,7 @@
 
 #include "common/error.h"
 #include "common/json_file.h"
+#include "common/seconds_since.h"
 #include "device/board.h"
 #include "device/clock.h"
 
@@ -17,10 +18,6 @@ namespace mf {
 namespace {
 
 using RigClock = std::chrono::steady_clock;
-
-double seconds_since(RigClock::time_point when) {
-  return std::chrono::duration<double>(RigClock::now() - when).count();
-}
 
 // 20261122-101530, and -2, -3 ... where that is taken already.
 std::filesystem::path new_session(const std::filesystem::path& folder) {

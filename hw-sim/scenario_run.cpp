@@ -17,6 +17,7 @@
 
 #include "common/error.h"
 #include "common/json_file.h"
+#include "common/seconds_since.h"
 #include "device/c_handle.h"
 #include "device/rig_status_json.h"
 #include "hw-sim/buttons.h"
@@ -36,10 +37,6 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds tick{5};
 constexpr milliseconds hold_to_stop{1400};
-
-double seconds_since(RunClock::time_point when) {
-  return std::chrono::duration<double>(RunClock::now() - when).count();
-}
 
 // The memory through which the daemon's disk is made ill.
 class DiskControl {

@@ -12,6 +12,7 @@
 
 #include "common/json_file.h"
 #include "common/response_curve.h"
+#include "common/seconds_since.h"
 #include "host/calibration/calibrate.h"
 #include "host/calibration/tag_search.h"
 #include "host/io/image_file.h"
@@ -23,10 +24,6 @@
 
 namespace mf {
 namespace {
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 testing::SyntheticCapture capture_of(int views) {
   return testing::synthetic_capture(testing::ordinary_camera(), views, 0.1, 1);

@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "common/seconds_since.h"
 #include "host/io/exr.h"
 #include "tests/host/desk/desk_truth.h"
 #include "tests/support/run_command.h"
@@ -81,10 +82,6 @@ std::string& given_session() {
 Desk& desk() {
   static Desk desk(given_session());
   return desk;
-}
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 double psnr_of_view(const ImageF& picture, int view) {
