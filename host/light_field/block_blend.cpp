@@ -75,27 +75,41 @@ MF_VECTORIZED void distance_penalties(const Lanes3& p, const Lanes4& proxy_point
   }
 }
 
+LeastLanes::LeastLanes(std::size_t count) : count_(count) {
+  for (std::size_t j = 0; j < count; ++j) rising_[j].v.fill(infinity);
+}
+
+namespace {
+
+// A value sinks past all that are less. Nothing changes when none is below the last.
+MF_VECTORIZED bool is_less_somewhere(const Lanes& values, const Lanes& last) {
+  int less = 0;
+  for (std::size_t i = 0; i < block_lanes; ++i) less += values.v[i] < last.v[i] ? 1 : 0;
+  return less > 0;
+}
+
+MF_VECTORIZED void sink(Lanes values, std::span<Lanes> rising) {
+  for (Lanes& lanes : rising)
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const float a = lanes.v[i], b = values.v[i];
+      lanes.v[i] = std::min(a, b);
+      values.v[i] = std::max(a, b);
+    }
+}
+
+}  // namespace
+
+void LeastLanes::add(const Lanes& values) {
+  if (!is_less_somewhere(values, greatest())) return;
+  known_ = std::min(known_ + 1, count_);
+  sink(values, {rising_.data(), known_});
+}
+
 MF_VECTORIZED void weights_of(std::span<Lanes> penalties, std::span<const Lanes> view_weights, int k, float floor,
                               Lanes& confidence) {
-  // The k + 1 least penalties of every texel, rising: each candidate sinks to its place.
   const std::size_t kept = static_cast<std::size_t>(k) + 1;
-  std::array<Lanes, 65> least;
-  for (std::size_t j = 0; j < kept; ++j)
-    for (std::size_t i = 0; i < block_lanes; ++i) least[j].v[i] = infinity;
-  std::size_t known = 0;
-  for (const Lanes& penalty : penalties) {
-    Lanes sinking = penalty;
-    int better = 0;
-    for (std::size_t i = 0; i < block_lanes; ++i) better += sinking.v[i] < least[kept - 1].v[i] ? 1 : 0;
-    if (better == 0) continue;
-    known = std::min(known + 1, kept);
-    for (std::size_t j = 0; j < known; ++j)
-      for (std::size_t i = 0; i < block_lanes; ++i) {
-        const float a = least[j].v[i], b = sinking.v[i];
-        least[j].v[i] = std::min(a, b);
-        sinking.v[i] = std::max(a, b);
-      }
-  }
+  LeastLanes least(kept);
+  for (const Lanes& penalty : penalties) least.add(penalty);
   Lanes inverse_threshold, sum{};
   for (std::size_t i = 0; i < block_lanes; ++i) {
     inverse_threshold.v[i] = 1 / (least[kept - 1].v[i] + floor);  // 0 where there is no (k + 1)-th view

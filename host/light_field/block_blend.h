@@ -44,6 +44,23 @@ inline constexpr float smallest_view_weight = 0.02F;
 void distance_penalties(const Lanes3& p, const Lanes4& proxy_point, const Eigen::Vector3f& centre, const Lanes& weight,
                         Lanes& penalty);
 
+// The few least values of every lane, rising.
+class LeastLanes {
+ public:
+  static constexpr std::size_t most = 65;
+  // Precondition: 1 ≤ count ≤ most. All infinite at first.
+  explicit LeastLanes(std::size_t count);
+
+  void add(const Lanes& values);
+  [[nodiscard]] const Lanes& operator[](std::size_t i) const { return rising_[i]; }
+  [[nodiscard]] const Lanes& greatest() const { return rising_[count_ - 1]; }
+
+ private:
+  std::size_t count_;
+  std::size_t known_ = 0;  // beyond, all are infinite
+  std::array<Lanes, most> rising_;
+};
+
 // blend_weights() for every texel: `penalties` (one a candidate) become weights that sum to 1 over the candidates, each
 // divided by the view's own weight, ready for premultiplied colours. `confidence`: the sum of the weights of the views
 // that speak, at most 1. Precondition: 1 ≤ k ≤ 64.

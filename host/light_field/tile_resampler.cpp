@@ -28,25 +28,6 @@ Lanes all_lanes(float value) {
   return lanes;
 }
 
-// The few least values of every lane.
-class LeastLanes {
- public:
-  explicit LeastLanes(std::size_t count) : rising_(count, all_lanes(std::numeric_limits<float>::infinity())) {}
-  void add(const Lanes& values) {
-    Lanes sinking = values;
-    for (Lanes& lanes : rising_)
-      for (std::size_t i = 0; i < block_lanes; ++i) {
-        const float a = lanes.v[i], b = sinking.v[i];
-        lanes.v[i] = std::min(a, b);
-        sinking.v[i] = std::max(a, b);
-      }
-  }
-  [[nodiscard]] const Lanes& greatest() const { return rising_.back(); }
-
- private:
-  std::vector<Lanes> rising_;
-};
-
 }  // namespace
 
 TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field,
