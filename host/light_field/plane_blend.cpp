@@ -106,7 +106,9 @@ MF_VECTORIZED void finish(const ViewSums& sums, Lanes3& colour, Lanes& confidenc
     colour.x.v[i] = sums.colour.x.v[i] * inverse;
     colour.y.v[i] = sums.colour.y.v[i] * inverse;
     colour.z.v[i] = sums.colour.z.v[i] * inverse;
-    confidence.v[i] = std::min(sums.seen.v[i], 1.0F);
+    // Where views only tie with the threshold the texel was seen all the same: it is no hole.
+    const float tied = std::min(sums.weight.v[i], ray_weight_tie);
+    confidence.v[i] = std::min(std::max(sums.seen.v[i], tied), 1.0F);
   }
 }
 

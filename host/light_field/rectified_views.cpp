@@ -24,9 +24,12 @@ RectifiedViews::RectifiedViews(const std::vector<FieldView>& views, const PlaneR
       blocks_((resolution + block_side - 1) / block_side),
       block_(static_cast<std::size_t>(blocks_ * blocks_)),
       vertex_(static_cast<std::size_t>((blocks_ + 1) * (blocks_ + 1))) {
+  // Straight colours are up to 1 / smallest_view_weight = 50 times the premultiplied ones that a view's unit is made
+  // for, which leave a factor of two.
+  constexpr float straight = 32;
   for (const FieldView& view : views) {
     centre_.push_back(view.centre_in_world);
-    unit_.push_back(view.levels.front().unit());
+    unit_.push_back(straight * view.levels.front().unit());
   }
   tbb::parallel_for(0, blocks_ * blocks_, [&](int i) { rectify(views, i % blocks_, i / blocks_); });
   const int side = blocks_ + 1;

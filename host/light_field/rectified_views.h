@@ -27,8 +27,8 @@ class RectifiedViews {
  public:
   RectifiedViews(const std::vector<FieldView>&, const PlaneRectangle&, int resolution);
 
-  // What the views that see some of it show of a block: for each 4 × 64 half floats (straight red, green, blue in the
-  // view's unit; weight), by lane.
+  // What the views that see some of it show of a block: for each 4 × 64 half floats (straight red, green, blue in
+  // unit(view); weight), by lane.
   struct Block {
     std::vector<std::uint32_t> views;        // rising
     std::vector<float> ray_x, ray_y, ray_z;  // of each through the block's middle, unit

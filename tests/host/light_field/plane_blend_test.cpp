@@ -75,6 +75,22 @@ TEST(PlaneBlend, SumsAreBuehlers) {
     }
 }
 
+// Views that tie with the threshold, as copies of one frame do, have seen the texel: it is no hole.
+TEST(PlaneBlend, TiesAreNoHoles) {
+  std::vector<Lanes> inverses(3), sinking;
+  for (Lanes& inverse : inverses) inverse.v.fill(2);
+  std::array<std::uint16_t, 4 * block_lanes> texels;
+  texels.fill(to_half(0.5F));
+  Lanes threshold, confidence;
+  inverse_thresholds(inverses, 2, 0, sinking, threshold);
+  ViewSums sums{};
+  for (const Lanes& inverse : inverses) add_view(inverse, threshold, texels.data(), 1, sums);
+  Lanes3 colour;
+  finish(sums, colour, confidence);
+  EXPECT_NEAR(colour.x.v[9], 0.5F, 1e-4F);
+  EXPECT_GT(confidence.v[9], 0);
+}
+
 // Only views above a bound are given: where fewer than k + 1 are, the bound is the threshold.
 TEST(PlaneBlend, ThresholdIsNotBelowItsBound) {
   std::vector<Lanes> inverses(3), sinking;

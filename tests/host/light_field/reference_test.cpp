@@ -88,6 +88,30 @@ TEST(AgainstReference, PlaneWithManyViewsAndALamp) {
   EXPECT_LT(d.confidence, 0.01);
 }
 
+// A lamp that a view shows in nothing but its soft border keeps its radiance.
+TEST(PlaneTiles, ALampAtAViewsBorderIsAsBrightAsItIs) {
+  const Eigen::Vector3f centre(0, 0, -0.8F);
+  const std::vector<FieldView> one{testing::analytic_view(
+      centre, Eigen::Vector3f::Zero(), 64, [&](const Eigen::Vector3f&, const Eigen::Vector3f& d) {
+        constexpr float two_columns = 30 / (1.2F * 64);  // from the middle to what they begin at
+        const Eigen::Vector3f aside = Eigen::Vector3f::UnitZ().unitOrthogonal();
+        return Eigen::Vector3f(Eigen::Vector3f::Ones() * (d.dot(aside) < -two_columns * d.z() ? 1000.0F : 1.0F));
+      })};
+  ResampleOptions options = options_for("plane");
+  options.size = 64;
+  options.fill = false;
+  Resampling resampling(one, {{}, {-0.35, -0.35}, {0.35, 0.35}}, options, Team(), {});
+  std::vector<Eigen::Vector4f> tile(resampling.field().texel_count());
+  resampling.fill(0, tile.data());
+  float brightest = 0, seen = 0;
+  for (const Eigen::Vector4f& texel : tile) {
+    brightest = std::max(brightest, texel.x());
+    if (texel.x() > 900) seen = std::max(seen, texel.w());
+  }
+  EXPECT_NEAR(brightest, 1000, 2);
+  EXPECT_LT(seen, 0.2F) << "not the border alone";
+}
+
 INSTANTIATE_TEST_SUITE_P(Proxies, AgainstReference,
                          ::testing::Values("plane", "sphere:1.4", "sphere:0.7", "sphere:inf"), [](const auto& name) {
                            std::string word = name.param;
