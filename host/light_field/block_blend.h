@@ -13,7 +13,7 @@ namespace mf {
 // is texel (x, y) of the block.
 inline constexpr int block_side = 8;
 inline constexpr std::size_t block_lanes = 64;
-struct alignas(32) Lanes {
+struct alignas(64) Lanes {
   std::array<float, block_lanes> v;
 };
 
