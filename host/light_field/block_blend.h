@@ -71,6 +71,9 @@ void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3
 // The same where they are known at every texel.
 void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour);
 
+// Copies a block's lanes into a tile of n² texels, as far as it reaches.
+void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int block_y, int n, Eigen::Vector4f* tile);
+
 // ---- ranking: one ray, many views ----
 
 // Squared ray_distance() of n views whose centres are given by coordinate.

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "host/light_field/plane_tiles.h"
-
 namespace mf {
 
 namespace {
