@@ -183,8 +183,9 @@ class Worker {
 Eigen::Vector4f Worker::emitted_at(const Eigen::Vector3f& p, float part_angle) const {
   Eigen::Vector4f sum = Eigen::Vector4f::Zero();
   for (const CellSample& part : parts_) {
-    if (!lit_.unhidden(p, part.direction)) continue;
-    const Eigen::Vector4f seen = lit_.radiance(p, part.direction, part_angle, all_views_);
+    const ShadedEmitter* const met = lit_.met(p, part.direction);
+    if (met == nullptr) continue;
+    const Eigen::Vector4f seen = lit_.radiance(met, p, part.direction, part_angle, all_views_);
     sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
   }
   return sum;

@@ -354,10 +354,11 @@ Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p) const
   Eigen::Vector4f on_emitter = Eigen::Vector4f::Zero(), beside = Eigen::Vector4f::Zero();
   float solid_angle = 0, all_beside = 0, unknown_beside = 0;
   for (const CellSample& part : parts) {
-    const Eigen::Vector4f seen = emitters_.radiance(p, part.direction, part_angle, candidate_views_);
+    const ShadedEmitter* const met = emitters_.met(p, part.direction);
+    const Eigen::Vector4f seen = emitters_.radiance(met, p, part.direction, part_angle, candidate_views_);
     const Eigen::Vector4f weighted = part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
     solid_angle += part.solid_angle_sr;
-    if (emitters_.unhidden(p, part.direction)) {
+    if (met != nullptr) {
       on_emitter += weighted;
       continue;
     }
