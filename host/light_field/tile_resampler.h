@@ -23,7 +23,8 @@ namespace mf {
 // What varies slowly over the plane is computed on a sparse grid of vertices and interpolated (Buehler's blending
 // field): which views could speak for a ray is decided at every second vertex by ranking all that look that way; what a
 // view saw of the direction's cell is fetched at every vertex. The penalties, and so the weights, are exact at every
-// texel. Where the proxy's distance jumps nothing is interpolated. One resampler a thread: it holds the working memory.
+// texel. Where the proxy's distance jumps nothing is interpolated, and where what was seen bends it is fetched anew for
+// every texel. One resampler a thread: it holds the working memory.
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
