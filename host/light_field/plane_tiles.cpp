@@ -35,11 +35,11 @@ void PlaneTiles::fill(std::span<const std::size_t> directions, Eigen::Vector4f* 
     for (int x = 0; x < views_.blocks(); ++x) {
       begin_block(x, y);
       for (std::size_t i = 0; i < directions.size(); ++i) {
-        const Bounds bounds = bounds_of(wanted_[i], x, y);
-        find_candidates(wanted_[i].direction, bounds.block);
+        const float least = least_threshold(wanted_[i], x, y);
+        find_candidates(wanted_[i].direction, least);
         for (std::size_t q = 0; q < quarters; ++q) {
           BlendedQuarter blended;
-          blend_quarter(wanted_[i], q, bounds.quarter[q], blended);
+          blend_quarter(wanted_[i], q, least, blended);
           store(blended, q, x, y, field_.resolution, tiles + i * texels);
         }
       }
@@ -64,8 +64,8 @@ float PlaneTiles::inverse_threshold_at(const RectifiedViews::Vertex& vertex, con
   bounds_.resize(std::max(bounds_.size(), count));
   squared_chords(direction, vertex.ray_x.data(), vertex.ray_y.data(), vertex.ray_z.data(), vertex.factor.data(), count,
                  bounds_.data());
-  const std::vector<ViewPenalty>& least =
-      ranking_.find(bounds_.data(), count, k_ + 1, [&](std::size_t i) { return bounds_[i]; });
+  const std::vector<ViewPenalty>& least = ranking_.find(
+      bounds_.data(), count, k_ + 1, [&](std::size_t i) { return bounds_[i]; }, [](std::size_t) {});
   const ViewPenalty& first_silent = *std::max_element(least.begin(), least.end(), ranks_before);
   const float weight = vertex.weight[first_silent.view];
   return inverse_penalty(std::sqrt(first_silent.penalty) * weight, weight);
@@ -90,21 +90,13 @@ void PlaneTiles::find_candidates(const Eigen::Vector3f& direction, float least_t
   for (const std::uint32_t slot : candidates_) look_up(slot);
 }
 
-PlaneTiles::Bounds PlaneTiles::bounds_of(const Wanted& wanted, int bx, int by) const {
+// Few views that matter in a block have an inverse penalty below.
+float PlaneTiles::least_threshold(const Wanted& wanted, int bx, int by) const {
   const std::size_t row = static_cast<std::size_t>(views_.blocks()) + 1;
   const float* const above =
       wanted.thresholds.data() + static_cast<std::size_t>(by) * row + static_cast<std::size_t>(bx);
   const float* const below = above + row;
-  const float least = std::min({above[0], above[1], below[0], below[1]});
-  Bounds bounds{slack * least, {}};
-  if (least <= 0) return bounds;  // somewhere no more than k views see the plane
-  const float left = 0.5F * (above[0] + below[0]), right = 0.5F * (above[1] + below[1]);
-  const float top = 0.5F * (above[0] + above[1]), bottom = 0.5F * (below[0] + below[1]);
-  const float middle = 0.5F * (left + right);
-  bounds.quarter = {slack * std::min({above[0], top, left, middle}), slack * std::min({above[1], top, right, middle}),
-                    slack * std::min({below[0], bottom, left, middle}),
-                    slack * std::min({below[1], bottom, right, middle})};
-  return bounds;
+  return slack * std::min({above[0], above[1], below[0], below[1]});
 }
 
 void PlaneTiles::begin_block(int bx, int by) {

@@ -31,14 +31,9 @@ class PlaneTiles {
     Eigen::Vector3f direction;      // world
     std::vector<float> thresholds;  // inverse, at the vertices, by rows
   };
-  // Thresholds' inverses in a block: few views that matter there fall below.
-  struct Bounds {
-    float block;
-    std::array<float, quarters> quarter;
-  };
   void find_thresholds(std::span<const std::size_t> directions);
   [[nodiscard]] float inverse_threshold_at(const RectifiedViews::Vertex&, const Eigen::Vector3f& direction);
-  [[nodiscard]] Bounds bounds_of(const Wanted&, int block_x, int block_y) const;
+  [[nodiscard]] float least_threshold(const Wanted&, int block_x, int block_y) const;
   void begin_block(int block_x, int block_y);
   void find_candidates(const Eigen::Vector3f& direction, float least_threshold);
   void look_up(std::size_t slot);

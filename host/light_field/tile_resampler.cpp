@@ -126,18 +126,26 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     const Eigen::Vector3f pixel = pixel_of(view, v.focus);
     if (pixel.z() <= 0) return INFINITY;
     const float weight =
-        view.fetch(level_for_angle(view, v.focus, cell_.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
+        view.fetch(level_for_angle(view, v.focus, cell_.part_angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z())
+            .w();
     if (weight < smallest_view_weight) return INFINITY;
     const float penalty = penalty_of(penalty_, {std::sqrt(bounds_[i]), coarseness_of(view, v.focus), weight});
     return penalty * penalty;
+  };
+  const auto announce = [&](std::size_t i) {
+    const FieldView& view = views_[lookers_.views[i]];
+    const Eigen::Vector3f pixel = pixel_of(view, v.focus);
+    if (pixel.z() > 0)
+      view.expect(level_for_angle(view, v.focus, cell_.part_angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
   };
   const std::size_t spare = cell_.fine_parts.empty() ? spare_views : spare_views_near_emitter;
   const std::size_t corner = static_cast<std::size_t>(corner_y * (blocks_ + 1) + corner_x);
   auto& best = best_lookers_[corner];
   best.clear();
   float farthest = 0;
-  for (const ViewPenalty& found : ranking_.find(bounds_.data(), lookers_.views.size(),
-                                                static_cast<std::size_t>(penalty_.k) + spare, squared_penalty)) {
+  for (const ViewPenalty& found :
+       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(penalty_.k) + spare,
+                     squared_penalty, announce)) {
     best.push_back(found.view);
     farthest = std::max(farthest, bounds_[found.view]);
   }
