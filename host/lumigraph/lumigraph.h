@@ -21,9 +21,9 @@
 
 namespace mf {
 
-struct CandidateViews;
 struct WantedResolution;
 class TilePool;
+class ViewTable;
 
 // What a picture of the lumigraph shows: the place, or which photo speaks for what, each in a colour of its own (the
 // blending field of Buehler et al. 2001, figure 6).
@@ -92,8 +92,8 @@ class Lumigraph {
  private:
   void look_at_proxy(const Progress&);
   [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, const LumigraphOptions&) const;
-  [[nodiscard]] CandidateViews speaking(std::span<const std::uint32_t> views) const;
-  [[nodiscard]] WantedResolution resolution_of(const View&, const CandidateViews& speaking) const;
+  [[nodiscard]] ViewTable speaking(std::span<const std::uint32_t> views, std::span<const AnsweringView>) const;
+  [[nodiscard]] WantedResolution resolution_of(const View&, const ViewTable& speaking) const;
 
   std::vector<Source> sources_;
   std::vector<AnsweringCamera> cameras_;
