@@ -55,8 +55,8 @@ struct LumigraphPicture {
 // For each pixel's ray the point X where it meets the proxy is found, and the k photos with the least penalty there
 // (ray_penalty.h) are blended at the places where they show X, with the weights of view_weights.h. The paper samples
 // these weights at some vertices and interpolates; here every pixel has its exact ones: photos are ranked for tiles of
-// the picture, then for bundles of 8 × 8 rays, and a photo is dropped for them only when no point of theirs can rank the
-// photo among the k + 1 best. So no grid shows, and a thousand photos cost less than twice as much as fifty.
+// the picture, then for bundles of 8 × 8 rays, and a photo is dropped for them only when no point of theirs can rank
+// the photo among the k + 1 best. So no grid shows, and a thousand photos cost less than twice as much as fifty.
 class Lumigraph {
  public:
   // Copies what it needs of the photos. Precondition: check_photos(photos).
