@@ -15,6 +15,7 @@
 #include "host/light_field/rectified_views.h"
 #include "host/light_field/view_ranking.h"
 #include "host/light_field/view_rays.h"
+#include "host/light_field/view_sieve.h"
 
 namespace mf {
 
@@ -51,6 +52,12 @@ class TileResampler {
   struct Lookers {
     std::vector<std::uint32_t> views;
     std::vector<float> centre_x, centre_y, centre_z;
+  };
+  // Where a view shows a point.
+  struct Look {
+    static constexpr int nowhere = -1;
+    float u = 0, v = 0;  // pixels of level 0
+    int level = nowhere;
   };
   struct Seen {
     Eigen::Vector4f colour;  // premultiplied; weight
@@ -95,6 +102,7 @@ class TileResampler {
   const std::vector<FieldView>& views_;
   const LightField& field_;
   const EmitterBlender& emitters_;
+  ViewSieve sieve_;
   TexelGrid grid_;
   PenaltyOptions penalty_;
   int blocks_;    // along a side
@@ -104,6 +112,7 @@ class TileResampler {
   std::vector<Vertex> vertex_;
   Lookers lookers_;
   std::vector<float> bounds_;
+  std::vector<Look> looks_;  // by looker, of those whose penalty is asked for
   LeastPenalties ranking_;
   std::vector<std::vector<std::uint32_t>> best_lookers_;  // by block corner
   std::vector<float> reach_m_;                            // by block corner: how far the farthest of them pass
