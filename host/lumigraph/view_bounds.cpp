@@ -154,7 +154,7 @@ MF_VECTORIZED void bound_all(const ViewTable& views, const Ball& ball, const Pen
     const float octaves = 0.5F * approximate_log2(before ? larger(area_ratio, 1e-30F) : 1.0F) - log_slip;
 
     const float bound = alpha * least_chord + beta * larger(octaves, 0.0F) + time_penalty[i];
-    least[i] = (beyond > r) | (z < -r) ? infinite : bound;
+    least[i] = ((beyond > r) | (z < -r)) ? infinite : bound;
   }
 }
 
