@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "common/check.h"
@@ -200,29 +201,23 @@ std::vector<FinishedTile> finish_tiles(Resampling& resampling, std::span<const s
   return finished;
 }
 
-// Whose turn a direction is: the ranks take turns by as many as are made at once.
-std::size_t turn_of(const Resampling& resampling, std::size_t direction) {
-  return direction / resampling.directions_at_once();
-}
-
 std::size_t threads_at_work() {
   const auto allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
   return std::min(allowed, static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()));
 }
 
-// Makes the tiles that are this rank's: (direction, tile) → string by `pack` in many threads, then `store` in the order
-// of directions.
+// Makes tiles until the team has all: (direction, tile) → string by `pack` in many threads, then `store` for those that
+// this rank made, in the order of directions.
 template <typename Pack, typename Store>
-void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, const Store& store) {
+void make_tiles(Resampling& resampling, Turns& turns, const Pack& pack, const Store& store) {
   const std::size_t directions = resampling.field().directions.size();
   const std::size_t at_once = resampling.directions_at_once();
   // So many that a slow tile does not hold up the others.
   const std::size_t turns_at_hand = (at_once > 1 ? 2 : 8) * threads_at_work();
-  std::size_t next = team.rank() * at_once;
   const auto deal = [&](tbb::flow_control& control) {
+    const std::size_t first = turns.take() * at_once;
     std::vector<std::size_t> dealt;
-    for (std::size_t d = next; d < std::min(next + at_once, directions); ++d) dealt.push_back(d);
-    next += team.size() * at_once;
+    for (std::size_t d = first; d < std::min(first + at_once, directions); ++d) dealt.push_back(d);
     if (dealt.empty()) control.stop();
     return dealt;
   };
@@ -233,8 +228,8 @@ void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, cons
       tbb::make_filter<void, Dealt>(tbb::filter_mode::serial_in_order, deal) &
           tbb::make_filter<Dealt, Finished>(tbb::filter_mode::parallel,
                                             [&](const Dealt& dealt) { return finish_tiles(resampling, dealt, pack); }) &
-          tbb::make_filter<Finished, void>(tbb::filter_mode::serial_in_order, [&](const Finished& finished) {
-            for (const FinishedTile& tile : finished) store(tile);
+          tbb::make_filter<Finished, void>(tbb::filter_mode::serial_in_order, [&](Finished finished) {
+            for (FinishedTile& tile : finished) store(std::move(tile));
           }));
 }
 
@@ -270,20 +265,23 @@ ResampleResult start_of_result(const Resampling& resampling) {
   return result;
 }
 
-// A tile as one rank sends it to another: its mean confidence, how many texels are guesses, then the packed bytes.
+// What goes before a tile's packed bytes when one rank sends it to another.
+struct TileHead {
+  std::size_t direction = 0;
+  std::size_t filled = 0;
+  double mean_confidence = 0;
+};
+
 std::string to_message(const FinishedTile& tile) {
-  std::string message(sizeof tile.mean_confidence + sizeof tile.filled, '\0');
-  std::memcpy(message.data(), &tile.mean_confidence, sizeof tile.mean_confidence);
-  std::memcpy(message.data() + sizeof tile.mean_confidence, &tile.filled, sizeof tile.filled);
+  const TileHead head{tile.direction, tile.filled, tile.mean_confidence};
+  std::string message(sizeof head, '\0');
+  std::memcpy(message.data(), &head, sizeof head);
   return message + tile.packed;
 }
-FinishedTile from_message(std::size_t direction, const std::string& message) {
-  FinishedTile tile;
-  tile.direction = direction;
-  std::memcpy(&tile.mean_confidence, message.data(), sizeof tile.mean_confidence);
-  std::memcpy(&tile.filled, message.data() + sizeof tile.mean_confidence, sizeof tile.filled);
-  tile.packed = message.substr(sizeof tile.mean_confidence + sizeof tile.filled);
-  return tile;
+FinishedTile from_message(const std::string& message) {
+  TileHead head;
+  std::memcpy(&head, message.data(), sizeof head);
+  return {head.direction, message.substr(sizeof head), head.mean_confidence, head.filled};
 }
 
 }  // namespace
@@ -299,7 +297,9 @@ ResampleResult resample(const std::vector<FieldView>& views, const PlaneRectangl
     std::copy(tile.begin(), tile.end(), field.tile(direction));
     return std::string();
   };
-  make_tiles(resampling, Team(), keep, [&](const FinishedTile& tile) {
+  Team alone;
+  Turns turns(alone);
+  make_tiles(resampling, turns, keep, [&](const FinishedTile& tile) {
     tally.add(field.directions, tile);
     report_progress(progress, "resampling",
                     static_cast<double>(tile.direction + 1) / static_cast<double>(field.directions.size()));
@@ -318,8 +318,9 @@ ResampleResult resample_to_file(Resampling& resampling, const std::filesystem::p
     return LightFieldWriter::pack(tile.data(), result.field.resolution);
   };
   Tally tally;
+  Turns turns(team);  // until all is received: it ends for all ranks together
   if (team.rank() > 0) {
-    make_tiles(resampling, team, pack, [&](const FinishedTile& tile) {
+    make_tiles(resampling, turns, pack, [&](const FinishedTile& tile) {
       tally.add(set, tile);
       team.send(to_message(tile));
     });
@@ -329,6 +330,7 @@ ResampleResult resample_to_file(Resampling& resampling, const std::filesystem::p
   LightFieldWriter writer(path, result.field);
   double writing_s = 0;
   std::size_t next = 0;
+  std::map<std::size_t, FinishedTile> waiting;  // for those before them, by direction
   const auto append = [&](const FinishedTile& tile) {
     const auto start = Clock::now();
     writer.append(tile.packed);
@@ -337,15 +339,23 @@ ResampleResult resample_to_file(Resampling& resampling, const std::filesystem::p
     ++next;
     report_progress(progress, "resampling", static_cast<double>(next) / static_cast<double>(set.size()));
   };
-  const auto append_others = [&] {
-    while (next < set.size() && !team.has(turn_of(resampling, next)))
-      append(from_message(next, team.receive(turn_of(resampling, next) % team.size())));
+  const auto keep = [&](FinishedTile tile) {
+    waiting.emplace(tile.direction, std::move(tile));
+    for (auto first = waiting.begin(); first != waiting.end() && first->first == next; first = waiting.erase(first))
+      append(first->second);
   };
-  make_tiles(resampling, team, pack, [&](const FinishedTile& tile) {
-    append_others();
-    append(tile);
+  const auto keep_received = [&](Team::Wait wait) {
+    while (team.size() > 1 && next < set.size()) {
+      const std::optional<std::string> message = team.receive(wait);
+      if (!message) return;
+      keep(from_message(*message));
+    }
+  };
+  make_tiles(resampling, turns, pack, [&](FinishedTile tile) {
+    keep(std::move(tile));
+    keep_received(Team::Wait::no);
   });
-  append_others();
+  keep_received(Team::Wait::yes);
   const auto start = Clock::now();
   writer.finish();
   result.seconds["writing"] = writing_s + seconds_since(start);

@@ -4,8 +4,10 @@
 #include <mpi.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <deque>
+#include <mutex>
 #include <vector>
 
 #include "common/check.h"
@@ -32,6 +34,7 @@ struct Sending {
 struct Team::Link {
   std::size_t rank = 0;
   std::size_t size = 1;
+  std::mutex calls;               // MPI is called from one thread at a time
   std::deque<Sending> under_way;  // a deque: messages stay where they are
 
   Link() {
@@ -93,6 +96,7 @@ void Team::share(std::span<const Share> shares) const {
 
 void Team::send(std::string message) {
   check(link_ != nullptr && link_->rank > 0, "only other ranks send to rank 0");
+  const std::lock_guard lock(link_->calls);
   if (link_->under_way.size() >= most_under_way) link_->finish_first();
   Sending& sending = link_->under_way.emplace_back();
   sending.message = std::move(message);
@@ -100,15 +104,56 @@ void Team::send(std::string message) {
                  MPI_COMM_WORLD, &sending.request));
 }
 
-std::string Team::receive(std::size_t from) {
+std::optional<std::string> Team::receive(Wait wait) {
   check(link_ != nullptr && link_->rank == 0, "only rank 0 receives");
+  const std::lock_guard lock(link_->calls);
   MPI_Status status;
-  must(MPI_Probe(static_cast<int>(from), tile_tag, MPI_COMM_WORLD, &status));
+  int there = 1;
+  if (wait == Wait::yes)
+    must(MPI_Probe(MPI_ANY_SOURCE, tile_tag, MPI_COMM_WORLD, &status));
+  else
+    must(MPI_Iprobe(MPI_ANY_SOURCE, tile_tag, MPI_COMM_WORLD, &there, &status));
+  if (there == 0) return std::nullopt;
   int size = 0;
   must(MPI_Get_count(&status, MPI_BYTE, &size));
   std::string message(static_cast<std::size_t>(size), '\0');
-  must(MPI_Recv(message.data(), size, MPI_BYTE, static_cast<int>(from), tile_tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE));
+  must(MPI_Recv(message.data(), size, MPI_BYTE, status.MPI_SOURCE, tile_tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE));
   return message;
+}
+
+// ---- turns ----
+
+// A number that rank 0 keeps and every rank adds to (MPI-3 one-sided: no rank has to answer).
+struct Turns::Counter {
+  std::uint64_t* number = nullptr;  // rank 0's
+  MPI_Win window = MPI_WIN_NULL;
+  std::size_t alone = 0;
+};
+
+Turns::Turns(Team& team) : link_(team.link_.get()), counter_(new Counter) {
+  if (link_ == nullptr) return;
+  const MPI_Aint bytes = link_->rank == 0 ? sizeof *counter_->number : 0;
+  must(MPI_Win_allocate(bytes, sizeof *counter_->number, MPI_INFO_NULL, MPI_COMM_WORLD, &counter_->number,
+                        &counter_->window));
+  if (link_->rank == 0) *counter_->number = 0;
+  must(MPI_Barrier(MPI_COMM_WORLD));  // nobody takes a turn before there is a first one
+  must(MPI_Win_lock_all(0, counter_->window));
+}
+
+Turns::~Turns() {
+  if (link_ == nullptr || std::uncaught_exceptions() > 0) return;  // the others may never come: as Link does
+  MPI_Win_unlock_all(counter_->window);
+  MPI_Win_free(&counter_->window);
+}
+
+std::size_t Turns::take() {
+  if (link_ == nullptr) return counter_->alone++;
+  const std::lock_guard lock(link_->calls);
+  const std::uint64_t one = 1;
+  std::uint64_t taken = 0;
+  must(MPI_Fetch_and_op(&one, &taken, MPI_UINT64_T, 0, 0, MPI_SUM, counter_->window));
+  must(MPI_Win_flush(0, counter_->window));
+  return taken;
 }
 
 }  // namespace mf

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,7 +11,7 @@
 namespace mf {
 
 // The processes that work on one thing together, as `mpirun -n N mirrorfield …` starts them; usually one. Each has a
-// rank from 0; rank 0 writes and prints. All of them call the same functions in the same order, from one thread at a
+// rank from 0; rank 0 writes and prints. All of them share the same things in the same order, from one thread at a
 // time. When one dies, mpirun ends the others.
 class Team {
  public:
@@ -24,7 +25,7 @@ class Team {
 
   [[nodiscard]] std::size_t rank() const;
   [[nodiscard]] std::size_t size() const;
-  // Of tasks dealt out in turn, whether this one is ours.
+  // Of tasks dealt out beforehand, whether this one is ours.
   [[nodiscard]] bool has(std::size_t task) const { return task % size() == rank(); }
 
   // What `from` has in `bytes` everyone has afterwards. All give as many.
@@ -36,14 +37,34 @@ class Team {
   void share(std::span<const Share>) const;
   void share(std::span<std::byte> bytes, std::size_t from) const;
 
-  // From any rank to rank 0, which receives from each in the order sent. send() returns at once, unless much is under
-  // way already.
+  // From any rank to rank 0, which receives what came first, or nothing when nothing is there yet and it does not want
+  // to wait. send() returns at once, unless much is under way already.
   void send(std::string message);
-  [[nodiscard]] std::string receive(std::size_t from);
+  enum class Wait { no, yes };
+  [[nodiscard]] std::optional<std::string> receive(Wait);
 
  private:
+  friend class Turns;
   struct Link;
   std::unique_ptr<Link> link_;  // nothing when alone
+};
+
+// Tasks dealt on demand: whoever is free takes the next one, so that no rank waits for a slower one's share. It begins
+// and ends for all ranks together. take() may be called while another thread sends or receives.
+class Turns {
+ public:
+  explicit Turns(Team&);
+  Turns(const Turns&) = delete;
+  Turns& operator=(const Turns&) = delete;
+  ~Turns();
+
+  // 0, 1, 2 …: each number once, to one of the ranks.
+  [[nodiscard]] std::size_t take();
+
+ private:
+  struct Counter;
+  Team::Link* link_;
+  std::unique_ptr<Counter> counter_;
 };
 
 // Rows of a picture that were made in turn, row y by rank y mod size: afterwards everyone has all.

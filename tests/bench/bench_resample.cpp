@@ -68,6 +68,18 @@ Run resample_command(const fs::path& session, const std::string& proxy, int dire
   return run;
 }
 
+// The same capture, of which every second view is left out.
+fs::path half_of(const fs::path& session) {
+  const fs::path half = session.parent_path() / "half";
+  if (fs::exists(half)) return half;
+  Calibration calibration = read_calibration(session / "calibration.json");
+  for (std::size_t i = 0; i < calibration.frames.size(); i += 2) calibration.frames[i].used = false;
+  fs::create_directories(half);
+  for (const char* part : {"frames", "session.db", "response.json"}) fs::create_symlink(session / part, half / part);
+  write_calibration(half / "calibration.json", calibration);
+  return half;
+}
+
 void print(const std::string& name, const Run& run) {
   if (run.summary.is_discarded()) return;
   fmt::print("{:28} {:6.1f} s wall, {:6.1f} s processor, peak {:.2f} GB; {}\n", name, run.wall_s, run.processor_s,
@@ -151,6 +163,7 @@ int run(int frames, int directions) {
   for (const char* proxy : {"plane", "auto"}) {
     print(proxy, resample_command(session, proxy, directions));
     print(fmt::format("{}, half the directions", proxy), resample_command(session, proxy, directions / 2));
+    print(fmt::format("{}, half the views", proxy), resample_command(half_of(session), proxy, directions));
   }
   const std::vector<std::string> two{
       "mpirun", "-n", "2", "--oversubscribe", "--mca", "btl", "self,vader", "--mca", "btl_base_warn_component_unused",
