@@ -47,7 +47,7 @@ IncidentLight light_of(const Capture& capture, const Bounds& object, const Light
   start = Clock::now();
   std::vector<PlaneTile> tiles =
       resample_just_in_time(capture.views, field, capture.penalty, plan.requests, quality(field, options));
-  IncidentLight light = incident_light(field.directions, field.plane, plan, std::move(tiles), options);
+  IncidentLight light = incident_light(field, object, plan, std::move(tiles), options);
   seconds["resampling"] = seconds_since(start);
   return light;
 }

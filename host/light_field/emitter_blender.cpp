@@ -25,25 +25,6 @@ struct Answer {
   Eigen::Vector4f seen;  // premultiplied
 };
 
-// What the views say of a ray that meets the emitter, when focused on the occluder; only views that look at the emitter
-// through that point.
-void ask_about_emitter(const std::vector<FieldView>& views, std::span<const std::uint32_t> candidates,
-                       const ShadedEmitter& e, const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
-                       float angle_rad, std::vector<Answer>& answers) {
-  const float along = (e.emitter.position - p).dot(direction);
-  const ProxyPoint x = proxy_point(p, direction, 1 / (e.share_along(p, direction) * along));
-  for (const std::uint32_t v : candidates) {
-    const FieldView& view = views[v];
-    if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ShadedEmitter::well_inside))
-      continue;
-    const Eigen::Vector3f pixel = pixel_of(view, x);
-    if (pixel.z() <= 0) continue;
-    const Eigen::Vector4f seen =
-        view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-    if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
-  }
-}
-
 float log_luminance(const Eigen::Vector4f& seen) {
   return std::log2(std::max(shown_luminance(seen), 1e-3F));
 }
@@ -130,28 +111,25 @@ Eigen::Vector4f EmitterBlender::radiance(const Eigen::Vector3f& p, const Eigen::
   thread_local std::vector<Answer> answers;  // called for every part of many cells: no allocation each time
   answers.clear();
   const ShadedEmitter* met = met_by(p, direction, 1);
-  if (met != nullptr && lit_ == Lit::no) return {0, 0, 0, 1};
   if (met != nullptr) {
     const auto visible = met->visibility(p, direction);
+    if (visible && lit_ == Lit::no) return {0, 0, 0, 1};
     if (visible) {
       const Eigen::Vector3f colour = *visible * met->radiance;
       return {colour.x(), colour.y(), colour.z(), 1};
     }
-    ask_about_emitter(views_, candidates, *met, p, direction, angle_rad, answers);
   }
-  if (answers.empty()) {
-    const ProxyPoint x = proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction));
-    for (const std::uint32_t v : candidates) {
-      const FieldView& view = views_[v];
-      if (met == nullptr &&
-          met_by(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ghost_margin) != nullptr)
-        continue;
-      const Eigen::Vector3f pixel = pixel_of(view, x);
-      if (pixel.z() <= 0) continue;
-      const Eigen::Vector4f seen =
-          view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-      if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
-    }
+  const ProxyPoint x = proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction));
+  for (const std::uint32_t v : candidates) {
+    const FieldView& view = views_[v];
+    if (met == nullptr &&
+        met_by(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ghost_margin) != nullptr)
+      continue;
+    const Eigen::Vector3f pixel = pixel_of(view, x);
+    if (pixel.z() <= 0) continue;
+    const Eigen::Vector4f seen =
+        view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
+    if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
   }
   std::array<ViewWeight, most_views> weights;
   thread_local std::vector<ViewPenalty> ranked;

@@ -23,7 +23,7 @@ namespace mf {
 // distances: no single focus is right. But a ray either meets the lamp's ball or not, and that is known:
 //  - a ray that meets it is focused on the occluder: of all views' rays through that point of the occluder, those that
 //    meet the ball too say whether it is hidden there (the lamp itself looks the same from everywhere). Together they
-//    draw the occluder's mask;
+//    draw the occluder's mask, which answers;
 //  - a ray that misses it is focused on the surroundings, and views whose own ray meets the ball have no say.
 // So the lamp's outline is sharp where geometry puts it, its shadows' edges are where the occluder puts them, and no
 // ghost of the lamp beside it adds energy.
