@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <system_error>
 #include <utility>
 
 #include "common/error.h"
@@ -62,6 +63,12 @@ void write_file_atomically(const std::filesystem::path& destination, std::string
     if (!out) fail_to_write(destination, errno != 0 ? errno : EIO);
   }
   file.commit();
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw InputError(folder.string(), "", "cannot be made (" + error.message() + "): give another folder");
 }
 
 }  // namespace mf

@@ -30,4 +30,7 @@ class AtomicFile {
 // Throws InputError naming the destination when it cannot be written (disk full, missing folder, no permission).
 void write_file_atomically(const std::filesystem::path& destination, std::string_view content);
 
+// With all above it. Throws InputError naming it.
+void make_folder(const std::filesystem::path&);
+
 }  // namespace mf

@@ -31,7 +31,8 @@ inline constexpr float ray_weight_tie = 1e-6F;
 // (k + 1)-th view fades out at its border, so that nothing jumps when it is gone.
 // Always > 0: views that tie with the threshold share what no better one takes.
 [[nodiscard]] inline float ray_weight(float penalty, float threshold, float floor) {
-  return (std::max(0.0F, 1 - (penalty + floor) / (threshold + floor)) + ray_weight_tie) / (penalty + floor);
+  const float fading = 1 - (penalty + floor) / (threshold + floor);
+  return ((fading > 0 ? fading : 0) + ray_weight_tie) / (penalty + floor);
 }
 
 // Reorders `candidates`. Writes at most k weights into `out` (which holds k) and returns how many; 0 when none of the

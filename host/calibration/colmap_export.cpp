@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <system_error>
 
 #include "common/atomic_file.h"
 #include "common/demosaic.h"
-#include "common/error.h"
 #include "common/mirror_picture.h"
 #include "common/virtual_view.h"
 #include "host/io/image_file.h"
@@ -53,12 +51,6 @@ double grey_exposure(const ImageF& picture) {
 
 std::string png_name(const std::string& frame_name) {
   return std::filesystem::path(frame_name).stem().string() + ".png";
-}
-
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw InputError(folder.string(), "", "cannot be made (" + error.message() + "): give another folder");
 }
 
 class Export {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "common/atomic_file.h"
 #include "common/error.h"
 #include "common/json_file.h"
 #include "common/seconds_since.h"
@@ -84,6 +85,8 @@ PhotoSet read_photos(const LumigraphArguments& a) {
     throw InputError("lumigraph", "",
                      "needs photos: give one of --colmap FOLDER, --transforms FILE and --session FOLDER");
   if (!(a.scale > 0 && a.scale <= 1)) throw InputError("lumigraph", "--scale", "must be above 0 and at most 1");
+  if (a.scene && a.session.empty())
+    throw InputError("lumigraph", "--scene", "is for a session's pictures: give --session FOLDER, or leave it out");
   if (!a.session.empty()) return read_session_photos(a.session, a.scale, a.scene, progress_bar());
   PhotoSet set = read_posed_photos(a.colmap, a.transforms);
   if (a.mask_below) mask_dark_background(set, static_cast<float>(*a.mask_below));

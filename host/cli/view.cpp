@@ -126,6 +126,8 @@ void view_photos(const ViewArguments& a) {
 }
 
 void run(const ViewArguments& a) {
+  if (a.scene && a.session.empty())
+    throw InputError("view", "--scene", "is for a session's pictures: give --session FOLDER, or leave it out");
   if (a.size[0] < smallest_window_width_px || a.size[1] < smallest_window_height_px || a.size[0] > 16384 ||
       a.size[1] > 16384)
     throw InputError("view", "--size",

@@ -162,6 +162,18 @@ MF_VECTORIZED void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& 
   }
 }
 
+void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int block_y, int n,
+                 Eigen::Vector4f* tile) {
+  const int columns = std::min(block_side, n - block_x * block_side),
+            rows = std::min(block_side, n - block_y * block_side);
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const std::size_t lane = static_cast<std::size_t>(y * block_side + x);
+      tile[(block_y * block_side + y) * n + block_x * block_side + x] = {colour.x.v[lane], colour.y.v[lane],
+                                                                         colour.z.v[lane], confidence.v[lane]};
+    }
+}
+
 MF_VECTORIZED void squared_ray_distances(const Eigen::Vector3f& p, const Eigen::Vector4f& proxy_point,
                                          const float* centre_x, const float* centre_y, const float* centre_z,
                                          std::size_t n, float* out) {

@@ -13,7 +13,7 @@ namespace mf {
 // is texel (x, y) of the block.
 inline constexpr int block_side = 8;
 inline constexpr std::size_t block_lanes = 64;
-struct alignas(32) Lanes {
+struct alignas(64) Lanes {
   std::array<float, block_lanes> v;
 };
 
@@ -70,6 +70,9 @@ void weights_of(std::span<Lanes> penalties, std::span<const Lanes> view_weights,
 void add_colours(const Patch<Eigen::Vector4f>& seen, const Lanes& weight, Lanes3& colour);
 // The same where they are known at every texel.
 void add_colours(const Lanes3& seen, const Lanes& weight, Lanes3& colour);
+
+// Copies a block's lanes into a tile of n² texels, as far as it reaches.
+void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int block_y, int n, Eigen::Vector4f* tile);
 
 // ---- ranking: one ray, many views ----
 

@@ -94,12 +94,8 @@ std::optional<Sweep> sweep_of(const Calibration& calibration) {
   return Sweep{*lowest, *highest, median(distances)};
 }
 
-}  // namespace
-
-std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, const MirrorTarget& target,
-                                                double height_m) {
-  if (!calibration.cam_from_world) return std::nullopt;
-  const std::vector<Footprint> footprints = footprints_on_plane(calibration, target, height_m);
+// What most of the footprints cover; nothing when they pass no common place.
+std::optional<PlaneRectangle> covered_by(const std::vector<Footprint>& footprints, double height_m) {
   if (footprints.empty()) return std::nullopt;
   std::vector<double> xs, ys;
   for (const Footprint& f : footprints) {
@@ -133,12 +129,20 @@ std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, 
         low = low.cwiseMin(Eigen::Vector2i(x, y));
         high = high.cwiseMax(Eigen::Vector2i(x + 1, y + 1));
       }
-  if ((high.array() <= low.array()).any()) return std::nullopt;  // they pass no common place
+  if ((high.array() <= low.array()).any()) return std::nullopt;
   PlaneRectangle rectangle;
   rectangle.world_from_plane.translation.z() = height_m;
   rectangle.min_m = origin + cell_m * low.cast<double>();
   rectangle.max_m = origin + cell_m * high.cast<double>();
   return rectangle;
+}
+
+}  // namespace
+
+std::optional<PlaneRectangle> covered_rectangle(const Calibration& calibration, const MirrorTarget& target,
+                                                double height_m) {
+  if (!calibration.cam_from_world) return std::nullopt;
+  return covered_by(footprints_on_plane(calibration, target, height_m), height_m);
 }
 
 PlaneRectangle chosen_rectangle(const Calibration& calibration, const MirrorTarget& target, double height_m,
@@ -154,20 +158,21 @@ PlaneRectangle chosen_rectangle(const Calibration& calibration, const MirrorTarg
     throw InputError(
         file, "--height",
         fmt::format("{:g} m is no place for the plane: {}; give a height near that, in metres", height_m, waved));
-  const auto covered = covered_rectangle(calibration, target, height_m);
+  const std::vector<Footprint> footprints = footprints_on_plane(calibration, target, height_m);
+  if (wanted && is_looked_through(footprints, *wanted)) {
+    const auto& r = *wanted;
+    return {{Eigen::Quaterniond::Identity(), {0, 0, height_m}}, {r[0], r[1]}, {r[2], r[3]}};
+  }
+  const auto covered = covered_by(footprints, height_m);
   if (!covered)
     throw InputError(
         file, "--height",
         fmt::format("no mirror view looks through a plane at {:g} m: {}; give a height near that", height_m, waved));
-  if (wanted) {
-    if (!is_looked_through(footprints_on_plane(calibration, target, height_m), *wanted))
-      throw InputError(file, "--rectangle",
-                       fmt::format("no mirror view looks through it: at this --height they cover {:.2f} {:.2f} {:.2f} "
-                                   "{:.2f}; give a part of that, world metres",
-                                   covered->min_m.x(), covered->min_m.y(), covered->max_m.x(), covered->max_m.y()));
-    const auto& r = *wanted;
-    return {{Eigen::Quaterniond::Identity(), {0, 0, height_m}}, {r[0], r[1]}, {r[2], r[3]}};
-  }
+  if (wanted)
+    throw InputError(file, "--rectangle",
+                     fmt::format("no mirror view looks through it: at this --height they cover {:.2f} {:.2f} {:.2f} "
+                                 "{:.2f}; give a part of that, world metres",
+                                 covered->min_m.x(), covered->min_m.y(), covered->max_m.x(), covered->max_m.y()));
   const double searched_m = grid_cells * cell_m;
   if (covered->size_m().maxCoeff() > searched_m - 0.5 * cell_m)
     throw InputError(file, "--height",

@@ -162,8 +162,8 @@ DirectionSet geodesic_hemisphere_of_frequency(int frequency) {
 
 DirectionSet geodesic_hemisphere(int count) {
   check(count >= 1, "a direction set needs a direction");
-  // A full sphere has 10 f² + 2 vertices; half of them and about 2.5 f that the horizon cuts reach above it. From one
-  // division less on, as that is an estimate.
+  // A full sphere has 10 f² + 2 vertices. Half of them reach above the horizon, and of those that it cuts 2.5 f more if
+  // f is even, 5 f if it is odd: begun with the even formula, one division less may do.
   int f = 1;
   while (5.0 * f * f + 2.5 * f + 1 < count) ++f;
   DirectionSet set = geodesic_hemisphere_of_frequency(std::max(1, f - 1));

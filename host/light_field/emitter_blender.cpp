@@ -100,17 +100,11 @@ const ShadedEmitter* EmitterBlender::met_by(const Eigen::Vector3f& origin, const
   return nullptr;
 }
 
-std::optional<Eigen::Vector3f> EmitterBlender::unhidden(const Eigen::Vector3f& p,
-                                                        const Eigen::Vector3f& direction) const {
-  const ShadedEmitter* met = met_by(p, direction, 1);
-  return met != nullptr ? std::optional<Eigen::Vector3f>(met->radiance) : std::nullopt;
-}
-
-Eigen::Vector4f EmitterBlender::radiance(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad,
+Eigen::Vector4f EmitterBlender::radiance(const ShadedEmitter* met, const Eigen::Vector3f& p,
+                                         const Eigen::Vector3f& direction, float angle_rad,
                                          std::span<const std::uint32_t> candidates) const {
   thread_local std::vector<Answer> answers;  // called for every part of many cells: no allocation each time
   answers.clear();
-  const ShadedEmitter* met = met_by(p, direction, 1);
   if (met != nullptr) {
     const auto visible = met->visibility(p, direction);
     if (visible && lit_ == Lit::no) return {0, 0, 0, 1};

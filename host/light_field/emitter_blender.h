@@ -47,14 +47,16 @@ class EmitterBlender {
   // Whether rays within `angle_rad` of the direction may meet one.
   [[nodiscard]] bool may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
 
-  // Blended colour and weight of one ray with a footprint of `angle_rad`; only `candidates` are asked (indices of
-  // views).
-  [[nodiscard]] Eigen::Vector4f radiance(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad,
-                                         std::span<const std::uint32_t> candidates) const;
+  // The emitter that a ray meets, hidden or not; null when it meets none.
+  [[nodiscard]] const ShadedEmitter* met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
+    return met_by(p, direction, 1);
+  }
 
-  // What an emitter that the ray meets would show if nothing hid it; nothing for rays that meet none.
-  [[nodiscard]] std::optional<Eigen::Vector3f> unhidden(const Eigen::Vector3f& p,
-                                                        const Eigen::Vector3f& direction) const;
+  // Blended colour and weight of one ray with a footprint of `angle_rad`. `met`: the emitter it meets. Only
+  // `candidates` are asked (indices of views).
+  [[nodiscard]] Eigen::Vector4f radiance(const ShadedEmitter* met, const Eigen::Vector3f& p,
+                                         const Eigen::Vector3f& direction, float angle_rad,
+                                         std::span<const std::uint32_t> candidates) const;
 
   [[nodiscard]] const std::vector<ShadedEmitter>& emitters() const { return emitters_; }
 

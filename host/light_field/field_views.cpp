@@ -248,12 +248,28 @@ void set_geometry(FieldView& view, const Calibration& calibration, const PixelBo
   view.focal_px = static_cast<float>(0.5 * (camera.fx() + camera.fy()) * scale);
 }
 
-void share_levels(const Team& team, std::size_t from, const PixelBox& box, std::vector<PremultipliedImage>& levels) {
+// Everyone gets the levels that others made: those of view i are made by rank i mod size.
+void share_levels(const Team& team, std::span<const PixelBox> boxes, std::span<FieldView> views) {
   if (team.size() == 1) return;
-  float unit = levels.empty() ? 0 : levels.front().unit();
-  team.share(std::as_writable_bytes(std::span(&unit, 1)), from);
-  if (levels.empty()) levels = empty_levels(box.width(), box.height(), unit);
-  for (PremultipliedImage& level : levels) team.share(std::as_writable_bytes(level.texels()), from);
+  const auto maker = [&](std::size_t i) { return i % team.size(); };
+  std::vector<float> units(views.size(), 0);
+  std::vector<Team::Share> shares;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (!views[i].levels.empty()) units[i] = views[i].levels.front().unit();
+    shares.push_back({std::as_writable_bytes(std::span(&units[i], 1)), maker(i)});
+  }
+  team.share(shares);
+  constexpr std::size_t views_at_once = 64;
+  for (std::size_t begin = 0; begin < views.size(); begin += views_at_once) {
+    shares.clear();
+    for (std::size_t i = begin; i < std::min(begin + views_at_once, views.size()); ++i) {
+      if (boxes[i].empty()) continue;
+      if (!team.has(i)) views[i].levels = empty_levels(boxes[i].width(), boxes[i].height(), units[i]);
+      for (PremultipliedImage& level : views[i].levels)
+        shares.push_back({std::as_writable_bytes(level.texels()), maker(i)});
+    }
+    team.share(shares);
+  }
 }
 
 }  // namespace
@@ -290,8 +306,7 @@ std::vector<FieldView> load_field_views(const SessionReader& session, const Resp
     const std::lock_guard lock(reporting);
     report_progress(progress, "linearizing views", static_cast<double>(finished) / static_cast<double>(frames.size()));
   });
-  for (std::size_t i = 0; i < loaded.size(); ++i)
-    if (!boxes[i].empty()) share_levels(team, i % team.size(), boxes[i], loaded[i].levels);
+  share_levels(team, boxes, loaded);
   std::erase_if(loaded, [](const FieldView& v) { return v.levels.empty(); });
   if (loaded.empty()) throw InputError(source, "frames", "holds no usable mirror pose: look at why_not of each frame");
   return loaded;

@@ -45,6 +45,14 @@ class PremultipliedImage {
     return decoded(sum);
   }
 
+  void expect(float x, float y) const {
+    const float u = x + 0.5F, v = y + 0.5F;
+    if (!(u >= 0 && v >= 0 && u < static_cast<float>(width_ + 1) && v < static_cast<float>(height_ + 1))) return;
+    const Texel* top = texels_.data() + index(static_cast<int>(u) - 1, static_cast<int>(v) - 1);
+    __builtin_prefetch(top);
+    __builtin_prefetch(top + width_ + 2);
+  }
+
   // Sums of many look-ups, decoded at their end.
   using Lanes = float __attribute__((vector_size(16)));
   void add_bilinear(float x, float y, float weight, Lanes& sum) const {
@@ -105,6 +113,11 @@ struct FieldView {
   [[nodiscard]] Eigen::Vector4f fetch(int level, float u, float v) const {
     const float scale = 1.0F / static_cast<float>(1 << level);
     return levels[static_cast<std::size_t>(level)].bilinear(u * scale, v * scale);
+  }
+  // Has the memory of a look-up that comes soon fetched meanwhile: views are too large for the caches.
+  void expect(int level, float u, float v) const {
+    const float scale = 1.0F / static_cast<float>(1 << level);
+    levels[static_cast<std::size_t>(level)].expect(u * scale, v * scale);
   }
 };
 

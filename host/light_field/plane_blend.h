@@ -2,12 +2,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
-
-#include "host/light_field/block_blend.h"
 
 namespace mf {
 
@@ -26,24 +24,54 @@ void nearness(const Eigen::Vector3f& direction, const float* ray_x, const float*
 
 // A penalty's inverse for one ray.
 [[nodiscard]] float inverse_penalty(float chord, float weight);
-// At every texel, 0 where the view's weight is. p, centre: in a frame whose third axis is the wanted direction.
-// `weights`: half floats by lane.
-void inverse_penalties(const Lanes3& p, const Eigen::Vector3f& centre, const std::uint16_t* weights, Lanes& inverse);
 
-// The (k + 1)-th largest at every texel, or `least` where that is smaller. `sinking`: working memory.
-void inverse_thresholds(std::span<const Lanes> inverse_penalties, std::size_t k, float least,
-                        std::vector<Lanes>& sinking, Lanes& out);
+// ---- a quarter of a block: 4 × 4 texels, one a lane ----
 
-// Sums over a block's views; the colour is the wanted one times `weight`.
-struct ViewSums {
-  Lanes weight, seen;  // `seen`: the sum of the weights of the views that speak
-  Lanes3 colour;
+inline constexpr int quarter_side = 4;
+inline constexpr std::size_t quarters = 4;        // of a block: quarter 2 y + x
+inline constexpr std::size_t quarter_lanes = 16;  // lane 4 y + x
+// Column and row of a lane's texel in its block.
+[[nodiscard]] constexpr std::array<int, 2> texel_of(std::size_t quarter, std::size_t lane) {
+  const int q = static_cast<int>(quarter), i = static_cast<int>(lane);
+  return {q % 2 * quarter_side + i % quarter_side, q / 2 * quarter_side + i / quarter_side};
+}
+// A vector of the compiler's (GCC, Clang): unlike an array it stays in registers while a loop adds to it.
+struct alignas(64) Quarter {
+  using Vector = float __attribute__((vector_size(64)));
+  Vector v;
 };
+static_assert(sizeof(Quarter) == quarter_lanes * sizeof(float));
 
-// Adds a view with Buehler's weight 1/penalty − 1/threshold where that is positive (view_weights.h). `texels`: 4 × 64
-// half floats, its red, green and blue in `unit`, its weight.
-void add_view(const Lanes& inverse_penalty, const Lanes& inverse_threshold, const std::uint16_t* texels, float unit,
-              ViewSums& sums);
-void finish(const ViewSums& sums, Lanes3& colour, Lanes& confidence);
+struct QuarterRays {
+  Quarter x, y, z;  // unit, from one view's centre to the texels
+  Quarter weight;   // the view's, 0 where it says nothing
+};
+// What a view shows of a quarter as half floats: its straight red, green and blue in the view's unit, its weight.
+inline constexpr std::size_t quarter_halves = 4 * quarter_lanes;
+
+// The rays to the texels first + x step_x + y step_y.
+void look_from(const Eigen::Vector3f& centre, const Eigen::Vector3f& first, const Eigen::Vector3f& step_x,
+               const Eigen::Vector3f& step_y, const std::uint16_t* shown, QuarterRays& rays);
+
+// A view that may speak for a quarter.
+struct QuarterView {
+  const QuarterRays* rays;
+  const std::uint16_t* shown;
+  float unit;  // of `shown`
+};
+// Of `views` those whose inverse penalty exceeds `least` at some texel: keeps them, in order, at the front of `views`,
+// and their inverse penalties in `inverse`. Returns how many.
+std::size_t inverse_penalties(const Eigen::Vector3f& direction, float least, std::span<QuarterView> views,
+                              Quarter* inverse);
+// The (k + 1)-th largest at every texel, or `least` where that is smaller. Precondition: 1 ≤ k ≤ 64.
+void inverse_thresholds(std::span<const Quarter> inverse_penalties, std::size_t k, float least, Quarter& out);
+
+struct BlendedQuarter {
+  Quarter red, green, blue, confidence;
+};
+// Blends views with Buehler's weights 1/penalty − 1/threshold where that is positive (view_weights.h). The confidence
+// is the sum of the weights of the views that speak, at most 1.
+void blend(std::span<const QuarterView> views, const Quarter* inverse_penalties, const Quarter& inverse_threshold,
+           BlendedQuarter& out);
 
 }  // namespace mf

@@ -13,19 +13,17 @@ namespace {
 
 constexpr float slack = 0.95F;  // between the vertices a threshold may be less than at any of them
 
-}  // namespace
-
-void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int block_y, int n,
-                 Eigen::Vector4f* tile) {
-  const int columns = std::min(block_side, n - block_x * block_side),
-            rows = std::min(block_side, n - block_y * block_side);
-  for (int y = 0; y < rows; ++y)
-    for (int x = 0; x < columns; ++x) {
-      const std::size_t lane = static_cast<std::size_t>(y * block_side + x);
-      tile[(block_y * block_side + y) * n + block_x * block_side + x] = {colour.x.v[lane], colour.y.v[lane],
-                                                                         colour.z.v[lane], confidence.v[lane]};
-    }
+// Copies a quarter of a block into a tile of n² texels, as far as it reaches.
+void store(const BlendedQuarter& from, std::size_t quarter, int block_x, int block_y, int n, Eigen::Vector4f* tile) {
+  for (std::size_t i = 0; i < quarter_lanes; ++i) {
+    const auto [x, y] = texel_of(quarter, i);
+    const int column = block_x * block_side + x, row = block_y * block_side + y;
+    if (column < n && row < n)
+      tile[row * n + column] = {from.red.v[i], from.green.v[i], from.blue.v[i], from.confidence.v[i]};
+  }
 }
+
+}  // namespace
 
 PlaneTiles::PlaneTiles(const RectifiedViews& views, const LightField& field, int k)
     : views_(views), field_(field), k_(static_cast<std::size_t>(k)) {}
@@ -34,37 +32,30 @@ void PlaneTiles::fill(std::span<const std::size_t> directions, Eigen::Vector4f* 
   find_thresholds(directions);
   const std::size_t texels = field_.texel_count();
   for (int y = 0; y < views_.blocks(); ++y)
-    for (int x = 0; x < views_.blocks(); ++x)
+    for (int x = 0; x < views_.blocks(); ++x) {
+      begin_block(x, y);
       for (std::size_t i = 0; i < directions.size(); ++i) {
-        Lanes3 colour;
-        Lanes confidence;
-        blend(wanted_[i], x, y, colour, confidence);
-        store_block(colour, confidence, x, y, field_.resolution, tiles + i * texels);
+        const float least = least_threshold(wanted_[i], x, y);
+        find_candidates(wanted_[i].direction, least);
+        for (std::size_t q = 0; q < quarters; ++q) {
+          BlendedQuarter blended;
+          blend_quarter(wanted_[i], q, least, blended);
+          store(blended, q, x, y, field_.resolution, tiles + i * texels);
+        }
       }
+    }
 }
 
 void PlaneTiles::find_thresholds(std::span<const std::size_t> directions) {
-  const std::size_t blocks = static_cast<std::size_t>(views_.blocks());
   const Eigen::Matrix3f turn = field_.plane.world_from_plane.rotation.cast<float>().toRotationMatrix();
   wanted_.resize(directions.size());
   for (std::size_t i = 0; i < directions.size(); ++i) {
-    Wanted& w = wanted_[i];
-    w.direction = turn * field_.directions.directions[directions[i]];
-    const Eigen::Vector3f aside = w.direction.unitOrthogonal();
-    w.from_world << aside.transpose(), w.direction.cross(aside).transpose(), w.direction.transpose();
-    w.least_thresholds.assign(blocks * blocks, std::numeric_limits<float>::max());
+    wanted_[i].direction = turn * field_.directions.directions[directions[i]];
+    wanted_[i].thresholds.clear();
   }
-  for (std::size_t y = 0; y <= blocks; ++y)
-    for (std::size_t x = 0; x <= blocks; ++x)
-      for (Wanted& w : wanted_) {
-        const float here =
-            slack * inverse_threshold_at(views_.vertex(static_cast<int>(x), static_cast<int>(y)), w.direction);
-        for (std::size_t by = y - std::min<std::size_t>(y, 1); by <= std::min(y, blocks - 1); ++by)
-          for (std::size_t bx = x - std::min<std::size_t>(x, 1); bx <= std::min(x, blocks - 1); ++bx) {
-            float& least = w.least_thresholds[by * blocks + bx];
-            least = std::min(least, here);
-          }
-      }
+  for (int y = 0; y <= views_.blocks(); ++y)
+    for (int x = 0; x <= views_.blocks(); ++x)
+      for (Wanted& w : wanted_) w.thresholds.push_back(inverse_threshold_at(views_.vertex(x, y), w.direction));
 }
 
 float PlaneTiles::inverse_threshold_at(const RectifiedViews::Vertex& vertex, const Eigen::Vector3f& direction) {
@@ -73,16 +64,16 @@ float PlaneTiles::inverse_threshold_at(const RectifiedViews::Vertex& vertex, con
   bounds_.resize(std::max(bounds_.size(), count));
   squared_chords(direction, vertex.ray_x.data(), vertex.ray_y.data(), vertex.ray_z.data(), vertex.factor.data(), count,
                  bounds_.data());
-  const std::vector<ViewPenalty>& least =
-      ranking_.find(bounds_.data(), count, k_ + 1, [&](std::size_t i) { return bounds_[i]; });
+  const std::vector<ViewPenalty>& least = ranking_.find(
+      bounds_.data(), count, k_ + 1, [&](std::size_t i) { return bounds_[i]; }, [](std::size_t) {});
   const ViewPenalty& first_silent = *std::max_element(least.begin(), least.end(), ranks_before);
   const float weight = vertex.weight[first_silent.view];
   return inverse_penalty(std::sqrt(first_silent.penalty) * weight, weight);
 }
 
 // The views that may exceed the threshold somewhere in the block.
-void PlaneTiles::find_candidates(const RectifiedViews::Block& block, const Eigen::Vector3f& direction,
-                                 float least_threshold) {
+void PlaneTiles::find_candidates(const Eigen::Vector3f& direction, float least_threshold) {
+  const RectifiedViews::Block& block = *block_;
   const std::size_t count = block.views.size();
   bounds_.resize(std::max(bounds_.size(), count));
   candidates_.resize(count);
@@ -96,29 +87,50 @@ void PlaneTiles::find_candidates(const RectifiedViews::Block& block, const Eigen
     found += bounds_[i] < 0 ? 1 : 0;
   }
   candidates_.resize(found);
+  for (const std::uint32_t slot : candidates_) look_up(slot);
 }
 
-void PlaneTiles::blend(const Wanted& wanted, int bx, int by, Lanes3& colour, Lanes& confidence) {
-  const RectifiedViews::Block& block = views_.block(bx, by);
-  const float least = wanted.least_thresholds[static_cast<std::size_t>(by * views_.blocks() + bx)];
-  find_candidates(block, wanted.direction, least);
+// Few views that matter in a block have an inverse penalty below.
+float PlaneTiles::least_threshold(const Wanted& wanted, int bx, int by) const {
+  const std::size_t row = static_cast<std::size_t>(views_.blocks()) + 1;
+  const float* const above =
+      wanted.thresholds.data() + static_cast<std::size_t>(by) * row + static_cast<std::size_t>(bx);
+  const float* const below = above + row;
+  return slack * std::min({above[0], above[1], below[0], below[1]});
+}
+
+void PlaneTiles::begin_block(int bx, int by) {
+  block_ = &views_.block(bx, by);
+  corner_ = views_.grid().at(static_cast<float>(bx * block_side) + 0.5F, static_cast<float>(by * block_side) + 0.5F);
+  looked_up_.assign(block_->views.size(), 0);
+  rays_.clear();
+}
+
+// Computes a view's rays to the block, the same for all directions, when it is first asked for.
+void PlaneTiles::look_up(std::size_t slot) {
+  if (looked_up_[slot] != 0) return;
   const TexelGrid& grid = views_.grid();
-  Lanes3 p;
-  set_points(wanted.from_world *
-                 grid.at(static_cast<float>(bx * block_side) + 0.5F, static_cast<float>(by * block_side) + 0.5F),
-             wanted.from_world * grid.step_x, wanted.from_world * grid.step_y, p);
-  const std::size_t count = candidates_.size();
-  inverse_penalties_.resize(std::max(inverse_penalties_.size(), count));
-  for (std::size_t c = 0; c < count; ++c)
-    inverse_penalties(p, wanted.from_world * views_.centre(block.views[candidates_[c]]), block.weights(candidates_[c]),
-                      inverse_penalties_[c]);
-  Lanes threshold;
-  inverse_thresholds({inverse_penalties_.data(), count}, k_, least, sinking_, threshold);
-  ViewSums sums{};
-  for (std::size_t c = 0; c < count; ++c)
-    add_view(inverse_penalties_[c], threshold, block.texels(candidates_[c]), views_.unit(block.views[candidates_[c]]),
-             sums);
-  finish(sums, colour, confidence);
+  for (std::size_t q = 0; q < quarters; ++q) {
+    const auto [x, y] = texel_of(q, 0);
+    look_from(views_.centre(block_->views[slot]),
+              corner_ + static_cast<float>(x) * grid.step_x + static_cast<float>(y) * grid.step_y, grid.step_x,
+              grid.step_y, block_->shown(slot, q), rays_.emplace_back());
+  }
+  looked_up_[slot] = static_cast<std::uint32_t>(rays_.size() / quarters);
+}
+
+void PlaneTiles::blend_quarter(const Wanted& wanted, std::size_t quarter, float least, BlendedQuarter& out) {
+  speakers_.resize(candidates_.size());
+  inverse_penalties_.resize(std::max(inverse_penalties_.size(), candidates_.size()));
+  for (std::size_t c = 0; c < candidates_.size(); ++c) {
+    const std::uint32_t slot = candidates_[c];
+    speakers_[c] = {&rays_[(looked_up_[slot] - 1) * quarters + quarter], block_->shown(slot, quarter),
+                    views_.unit(block_->views[slot])};
+  }
+  const std::size_t count = inverse_penalties(wanted.direction, least, speakers_, inverse_penalties_.data());
+  Quarter threshold;
+  inverse_thresholds({inverse_penalties_.data(), count}, k_, least, threshold);
+  blend({speakers_.data(), count}, inverse_penalties_.data(), threshold, out);
 }
 
 }  // namespace mf

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "host/light_field/plane_blend.h"
 #include "host/light_field/rectified_views.h"
 #include "host/light_field/view_ranking.h"
 
@@ -26,14 +28,16 @@ class PlaneTiles {
 
  private:
   struct Wanted {
-    Eigen::Vector3f direction;            // world
-    Eigen::Matrix3f from_world;           // into a frame whose third axis is the direction
-    std::vector<float> least_thresholds;  // inverse, by block: few views that matter there fall below
+    Eigen::Vector3f direction;      // world
+    std::vector<float> thresholds;  // inverse, at the vertices, by rows
   };
   void find_thresholds(std::span<const std::size_t> directions);
   [[nodiscard]] float inverse_threshold_at(const RectifiedViews::Vertex&, const Eigen::Vector3f& direction);
-  void find_candidates(const RectifiedViews::Block&, const Eigen::Vector3f& direction, float least_threshold);
-  void blend(const Wanted&, int block_x, int block_y, Lanes3& colour, Lanes& confidence);
+  [[nodiscard]] float least_threshold(const Wanted&, int block_x, int block_y) const;
+  void begin_block(int block_x, int block_y);
+  void find_candidates(const Eigen::Vector3f& direction, float least_threshold);
+  void look_up(std::size_t slot);
+  void blend_quarter(const Wanted&, std::size_t quarter, float least_threshold, BlendedQuarter&);
 
   const RectifiedViews& views_;
   const LightField& field_;
@@ -42,11 +46,14 @@ class PlaneTiles {
 
   std::vector<float> bounds_;
   LeastPenalties ranking_;
-  std::vector<std::uint32_t> candidates_;  // slots of the block at hand
-  std::vector<Lanes> inverse_penalties_, sinking_;
+  // Of the block at hand:
+  const RectifiedViews::Block* block_ = nullptr;
+  Eigen::Vector3f corner_;                 // the centre of its first texel
+  std::vector<std::uint32_t> candidates_;  // slots, looked up
+  std::vector<std::uint32_t> looked_up_;   // by slot: which of rays_ are its own, from 1; 0: none yet
+  std::vector<QuarterRays> rays_;          // four quarters each
+  std::vector<QuarterView> speakers_;
+  std::vector<Quarter> inverse_penalties_;
 };
-
-// Copies a block's lanes into a tile of n² texels, as far as it reaches.
-void store_block(const Lanes3& colour, const Lanes& confidence, int block_x, int block_y, int n, Eigen::Vector4f* tile);
 
 }  // namespace mf

@@ -46,6 +46,15 @@ Eigen::Vector4f look_at(const FieldView& view, const Eigen::Vector3f& p, float t
   return view.fetch(level_for_angle(view, x, texel_m), pixel.x() / pixel.z(), pixel.y() / pixel.z());
 }
 
+// As one lane of a quarter.
+void store(const Eigen::Vector4f& texel, float unit, std::uint16_t* lane) {
+  const bool speaks = texel.w() >= smallest_view_weight;
+  for (std::size_t c = 0; c < 3; ++c)
+    lane[c * quarter_lanes] =
+        speaks ? to_normal_half(texel[static_cast<Eigen::Index>(c)] / (unit * texel.w())) : std::uint16_t{0};
+  lane[3 * quarter_lanes] = speaks ? to_normal_half(texel.w()) : std::uint16_t{0};
+}
+
 // Whether a view may show some of a quadrangle: its corners do not all lie beyond one edge of the picture. `reach_px`:
 // how far an interpolation reaches.
 bool may_see(const FieldView& view, const std::array<Eigen::Vector3f, 4>& corners, float reach_px) {
@@ -88,22 +97,19 @@ void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, i
                                                grid_.at(x0, y0 + block_side),
                                                grid_.at(x0 + block_side, y0 + block_side)};
   const Eigen::Vector3f middle = grid_.at(x0 + 0.5F * block_side, y0 + 0.5F * block_side);
-  std::array<std::uint16_t, 4 * block_lanes> texels;
+  std::array<std::uint16_t, quarters * quarter_halves> shown;
   for (std::uint32_t v = 0; v < views.size(); ++v) {
     const float texel_px = texel_m_ * views[v].focal_px / (corners[0] - views[v].centre_in_world).norm();
     if (!may_see(views[v], corners, 2 * texel_px + 2)) continue;
     float most = 0;
-    for (std::size_t i = 0; i < block_lanes; ++i) {
-      const Eigen::Vector3f p =
-          grid_.at(x0 + static_cast<float>(i % block_side) + 0.5F, y0 + static_cast<float>(i / block_side) + 0.5F);
-      const Eigen::Vector4f shown = look_at(views[v], p, texel_m_);
-      const bool speaks = shown.w() >= smallest_view_weight;
-      for (std::size_t c = 0; c < 3; ++c)
-        texels[c * block_lanes + i] =
-            speaks ? to_normal_half(shown[static_cast<Eigen::Index>(c)] / (unit_[v] * shown.w())) : std::uint16_t{0};
-      texels[3 * block_lanes + i] = speaks ? to_normal_half(shown.w()) : std::uint16_t{0};
-      most = std::max(most, shown.w());
-    }
+    for (std::size_t q = 0; q < quarters; ++q)
+      for (std::size_t i = 0; i < quarter_lanes; ++i) {
+        const auto [x, y] = texel_of(q, i);
+        const Eigen::Vector3f p = grid_.at(x0 + static_cast<float>(x) + 0.5F, y0 + static_cast<float>(y) + 0.5F);
+        const Eigen::Vector4f texel = look_at(views[v], p, texel_m_);
+        store(texel, unit_[v], shown.data() + q * quarter_halves + i);
+        most = std::max(most, texel.w());
+      }
     if (most < smallest_view_weight) continue;
     const Eigen::Vector3f ray = (middle - views[v].centre_in_world).normalized();
     block.views.push_back(v);
@@ -112,7 +118,7 @@ void RectifiedViews::rectify(const std::vector<FieldView>& views, int block_x, i
     block.ray_z.push_back(ray.z());
     block.spread_rad.push_back(spread_of(ray, corners, views[v].centre_in_world));
     block.most.push_back(most);
-    block.halves.insert(block.halves.end(), texels.begin(), texels.end());
+    block.halves.insert(block.halves.end(), shown.begin(), shown.end());
   }
 }
 

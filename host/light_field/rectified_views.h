@@ -8,6 +8,7 @@
 #include "host/light_field/block_blend.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/plane_blend.h"
 
 namespace mf {
 
@@ -27,8 +28,7 @@ class RectifiedViews {
  public:
   RectifiedViews(const std::vector<FieldView>&, const PlaneRectangle&, int resolution);
 
-  // What the views that see some of it show of a block: for each 4 × 64 half floats (straight red, green, blue in
-  // unit(view); weight), by lane.
+  // What the views that see some of it show of a block, in unit(view): for each four quarters (plane_blend.h).
   struct Block {
     std::vector<std::uint32_t> views;        // rising
     std::vector<float> ray_x, ray_y, ray_z;  // of each through the block's middle, unit
@@ -36,8 +36,9 @@ class RectifiedViews {
     std::vector<float> most;                 // its weight where it is largest
     std::vector<std::uint16_t> halves;
 
-    [[nodiscard]] const std::uint16_t* texels(std::size_t slot) const { return halves.data() + slot * 4 * block_lanes; }
-    [[nodiscard]] const std::uint16_t* weights(std::size_t slot) const { return texels(slot) + 3 * block_lanes; }
+    [[nodiscard]] const std::uint16_t* shown(std::size_t slot, std::size_t quarter) const {
+      return halves.data() + (slot * quarters + quarter) * quarter_halves;
+    }
   };
   // The views that see a point where blocks meet.
   struct Vertex {

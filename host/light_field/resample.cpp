@@ -2,6 +2,7 @@
 #include "host/light_field/resample.h"
 
 #include <tbb/enumerable_thread_specific.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
@@ -204,6 +205,11 @@ std::size_t turn_of(const Resampling& resampling, std::size_t direction) {
   return direction / resampling.directions_at_once();
 }
 
+std::size_t threads_at_work() {
+  const auto allowed = tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+  return std::min(allowed, static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()));
+}
+
 // Makes the tiles that are this rank's: (direction, tile) → string by `pack` in many threads, then `store` in the order
 // of directions.
 template <typename Pack, typename Store>
@@ -211,8 +217,7 @@ void make_tiles(Resampling& resampling, const Team& team, const Pack& pack, cons
   const std::size_t directions = resampling.field().directions.size();
   const std::size_t at_once = resampling.directions_at_once();
   // So many that a slow tile does not hold up the others.
-  const std::size_t turns_at_hand =
-      (at_once > 1 ? 2 : 8) * static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+  const std::size_t turns_at_hand = (at_once > 1 ? 2 : 8) * threads_at_work();
   std::size_t next = team.rank() * at_once;
   const auto deal = [&](tbb::flow_control& control) {
     std::vector<std::size_t> dealt;
@@ -247,7 +252,7 @@ struct Tally {
     packing_s += tile.packing_s;
   }
   void enter(ResampleResult& result) const {
-    const double threads = tbb::this_task_arena::max_concurrency();
+    const double threads = static_cast<double>(threads_at_work());
     result.mean_confidence = confidence / weights;
     result.filled_share =
         static_cast<double>(filled) / static_cast<double>(result.field.directions.size() * result.field.texel_count());

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "host/light_field/distance_march.h"
 #include "host/tracing/ray_scene.h"
 
 namespace mf {
@@ -73,25 +74,7 @@ float Surroundings::inverse_distance_along(const Eigen::Vector3f& p, const Eigen
   if (mesh) return inverse_to_mesh(*mesh, p, direction);
   const Eigen::Vector3f from_centre = p - centre_in_world;
   if (inverse_distance.data.size() == 1) return inverse_to_sphere(from_centre, direction, inverse_distance.data[0]);
-  constexpr float nearest_m = 0.2F;
-  constexpr float largest_inverse = 1 / nearest_m;
-  // Marched from near to far in inverse distance, which moves evenly over the picture: the first crossing is what is
-  // seen.
-  constexpr int steps = 24;
-  float farther = 0, behind_farther = 1;
-  float previous = largest_inverse, behind_previous = -1;
-  for (int i = 1; i <= steps; ++i) {
-    farther = largest_inverse * (1 - static_cast<float>(i) / steps);
-    const Eigen::Vector3f x = direction + farther * from_centre;  // from the centre, times the inverse distance
-    const float length = x.norm();
-    behind_farther = length * inverse_distance_of(x / length) - farther;  // > 0: beyond the surface
-    if (behind_farther > 0) break;
-    previous = farther;
-    behind_previous = behind_farther;
-  }
-  if (behind_farther <= 0) return 0;
-  const float share = behind_previous < 0 ? behind_previous / (behind_previous - behind_farther) : 0;
-  return previous + share * (farther - previous);
+  return march_to_surface(inverse_distance, from_centre, direction);
 }
 
 Eigen::Vector4f Surroundings::panorama_at(const Eigen::Vector3f& d) const {

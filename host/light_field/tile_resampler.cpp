@@ -6,8 +6,6 @@
 #include <cmath>
 #include <limits>
 
-#include "host/light_field/plane_tiles.h"
-
 namespace mf {
 
 namespace {
@@ -35,6 +33,7 @@ TileResampler::TileResampler(const std::vector<FieldView>& views, const LightFie
     : views_(views),
       field_(field),
       emitters_(emitters),
+      sieve_(views),
       grid_(field.plane, field.resolution),
       penalty_(penalty),
       blocks_((field.resolution + block_side - 1) / block_side),
@@ -86,34 +85,24 @@ void TileResampler::prepare(std::size_t i) {
 
 // The others see none of the tile's proxy points, as their outline in the view lies beside its picture.
 void TileResampler::find_lookers() {
-  lookers_.views.clear();
+  std::array<ProxyPoint, static_cast<std::size_t>(outline_points * outline_points)> outline;
+  for (int i = 0; i < outline_points * outline_points; ++i)
+    outline[static_cast<std::size_t>(i)] = vertex(i % outline_points * (vertices_ - 1) / (outline_points - 1),
+                                                  i / outline_points * (vertices_ - 1) / (outline_points - 1))
+                                               .focus;
+  sieve_.find(outline, outline_margin, cell_.angle_rad, lookers_.views);
   lookers_.centre_x.clear();
   lookers_.centre_y.clear();
   lookers_.centre_z.clear();
-  for (std::uint32_t v = 0; v < views_.size(); ++v) {
-    const FieldView& view = views_[v];
-    Eigen::Array2f low = Eigen::Array2f::Constant(INFINITY), high = -low;
-    bool behind = false;
-    for (int i = 0; i < outline_points * outline_points; ++i) {
-      const int x = i % outline_points * (vertices_ - 1) / (outline_points - 1);
-      const int y = i / outline_points * (vertices_ - 1) / (outline_points - 1);
-      const Eigen::Vector3f pixel = pixel_of(view, vertex(x, y).focus);
-      behind = behind || pixel.z() <= 0;
-      const Eigen::Array2f at = pixel.head<2>().array() / pixel.z();
-      low = low.min(at);
-      high = high.max(at);
-    }
-    const Eigen::Array2f reach = outline_margin * (high - low) + 2 * cell_.angle_rad * view.focal_px;
-    const Eigen::Array2f size(static_cast<float>(view.levels.front().width()),
-                              static_cast<float>(view.levels.front().height()));
-    if (!behind && ((high + reach < 0).any() || (low - reach > size).any())) continue;
-    lookers_.views.push_back(v);
-    lookers_.centre_x.push_back(view.centre_in_world.x());
-    lookers_.centre_y.push_back(view.centre_in_world.y());
-    lookers_.centre_z.push_back(view.centre_in_world.z());
+  for (const std::uint32_t v : lookers_.views) {
+    const Eigen::Vector3f& centre = views_[v].centre_in_world;
+    lookers_.centre_x.push_back(centre.x());
+    lookers_.centre_y.push_back(centre.y());
+    lookers_.centre_z.push_back(centre.z());
   }
   const std::size_t count = lookers_.views.size();
   bounds_.resize(std::max(bounds_.size(), count));
+  looks_.resize(std::max(looks_.size(), count));
   mark_.resize(std::max(mark_.size(), count), 0);
   cells_.resize(std::max(cells_.size(), count));
   seen_.resize(std::max(seen_.size(), count * patch_side * static_cast<std::size_t>(vertices_)));
@@ -123,12 +112,21 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
   const Vertex& v = vertex(corner_x * block_vertices, corner_y * block_vertices);
   squared_ray_distances(v.p, v.focus, lookers_.centre_x.data(), lookers_.centre_y.data(), lookers_.centre_z.data(),
                         lookers_.views.size(), bounds_.data());
-  const auto squared_penalty = [&](std::size_t i) {
+  const auto announce = [&](std::size_t i) {
     const FieldView& view = views_[lookers_.views[i]];
     const Eigen::Vector3f pixel = pixel_of(view, v.focus);
-    if (pixel.z() <= 0) return INFINITY;
-    const float weight =
-        view.fetch(level_for_angle(view, v.focus, cell_.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z()).w();
+    Look& look = looks_[i];
+    look = {pixel.x() / pixel.z(), pixel.y() / pixel.z(), level_for_angle(view, v.focus, cell_.angle_rad)};
+    if (pixel.z() <= 0)
+      look.level = Look::nowhere;
+    else
+      view.expect(look.level, look.u, look.v);
+  };
+  const auto squared_penalty = [&](std::size_t i) {
+    const FieldView& view = views_[lookers_.views[i]];
+    const Look& look = looks_[i];
+    if (look.level == Look::nowhere) return INFINITY;
+    const float weight = view.fetch(look.level, look.u, look.v).w();
     if (weight < smallest_view_weight) return INFINITY;
     const float penalty = penalty_of(penalty_, {std::sqrt(bounds_[i]), coarseness_of(view, v.focus), weight});
     return penalty * penalty;
@@ -138,8 +136,9 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
   auto& best = best_lookers_[corner];
   best.clear();
   float farthest = 0;
-  for (const ViewPenalty& found : ranking_.find(bounds_.data(), lookers_.views.size(),
-                                                static_cast<std::size_t>(penalty_.k) + spare, squared_penalty)) {
+  for (const ViewPenalty& found :
+       ranking_.find(bounds_.data(), lookers_.views.size(), static_cast<std::size_t>(penalty_.k) + spare,
+                     squared_penalty, announce)) {
     best.push_back(found.view);
     farthest = std::max(farthest, bounds_[found.view]);
   }
@@ -356,10 +355,11 @@ Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p) const
   Eigen::Vector4f on_emitter = Eigen::Vector4f::Zero(), beside = Eigen::Vector4f::Zero();
   float solid_angle = 0, all_beside = 0, unknown_beside = 0;
   for (const CellSample& part : parts) {
-    const Eigen::Vector4f seen = emitters_.radiance(p, part.direction, part_angle, candidate_views_);
+    const ShadedEmitter* const met = emitters_.met(p, part.direction);
+    const Eigen::Vector4f seen = emitters_.radiance(met, p, part.direction, part_angle, candidate_views_);
     const Eigen::Vector4f weighted = part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
     solid_angle += part.solid_angle_sr;
-    if (emitters_.unhidden(p, part.direction)) {
+    if (met != nullptr) {
       on_emitter += weighted;
       continue;
     }

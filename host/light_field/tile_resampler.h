@@ -15,6 +15,7 @@
 #include "host/light_field/rectified_views.h"
 #include "host/light_field/view_ranking.h"
 #include "host/light_field/view_rays.h"
+#include "host/light_field/view_sieve.h"
 
 namespace mf {
 
@@ -23,7 +24,8 @@ namespace mf {
 // What varies slowly over the plane is computed on a sparse grid of vertices and interpolated (Buehler's blending
 // field): which views could speak for a ray is decided at every second vertex by ranking all that look that way; what a
 // view saw of the direction's cell is fetched at every vertex. The penalties, and so the weights, are exact at every
-// texel. Where the proxy's distance jumps nothing is interpolated. One resampler a thread: it holds the working memory.
+// texel. Where the proxy's distance jumps nothing is interpolated, and where what was seen bends it is fetched anew for
+// every texel. One resampler a thread: it holds the working memory.
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
@@ -50,6 +52,12 @@ class TileResampler {
   struct Lookers {
     std::vector<std::uint32_t> views;
     std::vector<float> centre_x, centre_y, centre_z;
+  };
+  // Where a view shows a point.
+  struct Look {
+    static constexpr int nowhere = -1;
+    float u = 0, v = 0;  // pixels of level 0
+    int level = nowhere;
   };
   struct Seen {
     Eigen::Vector4f colour;  // premultiplied; weight
@@ -94,6 +102,7 @@ class TileResampler {
   const std::vector<FieldView>& views_;
   const LightField& field_;
   const EmitterBlender& emitters_;
+  ViewSieve sieve_;
   TexelGrid grid_;
   PenaltyOptions penalty_;
   int blocks_;    // along a side
@@ -103,6 +112,7 @@ class TileResampler {
   std::vector<Vertex> vertex_;
   Lookers lookers_;
   std::vector<float> bounds_;
+  std::vector<Look> looks_;  // by looker, of those whose penalty is asked for
   LeastPenalties ranking_;
   std::vector<std::vector<std::uint32_t>> best_lookers_;  // by block corner
   std::vector<float> reach_m_;                            // by block corner: how far the farthest of them pass

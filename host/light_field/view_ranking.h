@@ -20,19 +20,25 @@ namespace mf {
 class LeastPenalties {
  public:
   // `lower_bound[i]` ≤ the penalty of view i, which `penalty_of(i)` computes (infinite: it has no say). The result is
-  // valid until the next call; in no order.
-  template <typename PenaltyOf>
+  // valid until the next call; in no order. `announce(i)` comes for each of some views before their penalties are asked
+  // for: what these need can be fetched meanwhile.
+  template <typename PenaltyOf, typename Announce>
   const std::vector<ViewPenalty>& find(const float* lower_bound, std::size_t count, std::size_t wanted,
-                                       const PenaltyOf& penalty_of) {
+                                       const PenaltyOf& penalty_of, const Announce& announce) {
+    asked_.resize(std::max(asked_.size(), count));
     float tried = -1;  // views below this bound have been looked at
     least_.clear();
     for (;;) {
       std::size_t within = 0;
+      std::size_t asked = 0;
       for (std::size_t i = 0; i < count; ++i) {
-        if (!(lower_bound[i] < bound_) || lower_bound[i] < tried) continue;
-        const float penalty = penalty_of(i);
-        if (penalty < std::numeric_limits<float>::infinity())
-          least_.push_back({static_cast<std::uint32_t>(i), penalty});
+        asked_[asked] = static_cast<std::uint32_t>(i);
+        asked += lower_bound[i] < bound_ && lower_bound[i] >= tried ? 1 : 0;
+      }
+      for (std::size_t a = 0; a < asked; ++a) announce(asked_[a]);
+      for (std::size_t a = 0; a < asked; ++a) {
+        const float penalty = penalty_of(asked_[a]);
+        if (penalty < std::numeric_limits<float>::infinity()) least_.push_back({asked_[a], penalty});
       }
       for (const ViewPenalty& v : least_) within += v.penalty < bound_ ? 1 : 0;
       if (within >= wanted || bound_ == std::numeric_limits<float>::max()) break;
@@ -50,6 +56,7 @@ class LeastPenalties {
 
  private:
   float bound_ = 1e-3F;
+  std::vector<std::uint32_t> asked_;
   std::vector<ViewPenalty> least_;
 };
 

@@ -36,21 +36,23 @@ void store(Image<T>& picture, std::size_t pixel, Float4 colour) {
 template <typename T, typename ColourOf>
 inline __attribute__((always_inline)) void blend(const ChosenViews& chosen, Image<T>& picture, ImageU8& covered,
                                                  const ColourOf& colour_of) {
-  for (std::size_t i = 0; i < chosen.pixel.size(); ++i) {
+  const std::size_t rays = chosen.pixel.size();
+  for (std::size_t i = 0; i < rays; ++i) {
     if (chosen.pixel[i] < 0) continue;
     const auto pixel = static_cast<std::size_t>(chosen.pixel[i]);
     Float4 sum{};
-    float speaking = 0;
+    float sight = 0;
     for (std::size_t row = 0; row < static_cast<std::size_t>(chosen.k); ++row) {
-      const std::size_t at = row * chosen.row_length + i;
-      const float weight = chosen.weight[at];
+      const float weight = chosen.weight[row * rays + i];
       if (!(weight > 0)) continue;
-      speaking += weight;
-      sum += weight * colour_of(chosen.view[at], chosen.x[at], chosen.y[at], chosen.lod[at]);
+      const auto candidate = static_cast<std::size_t>(chosen.candidate[row * rays + i]);
+      const std::size_t at = candidate * rays + i;
+      sum += weight * colour_of(chosen.view[candidate], chosen.x[at], chosen.y[at], chosen.lod[at]);
+      sight = std::max(sight, chosen.sight[at]);
     }
-    if (!(speaking > 0)) continue;
+    if (!(sight > 0)) continue;
     store(picture, pixel, sum);
-    covered.data[pixel] = chosen.sight[i] > least_seen ? Covered::seen : Covered::guessed;
+    covered.data[pixel] = sight > least_seen ? Covered::seen : Covered::guessed;
   }
 }
 
@@ -138,24 +140,24 @@ std::vector<AnsweringView> Lumigraph::views_from(const Eigen::Vector3d& eye, con
   return views;
 }
 
-CandidateViews Lumigraph::speaking(std::span<const std::uint32_t> views) const {
+ViewTable Lumigraph::speaking(std::span<const std::uint32_t> views, std::span<const AnsweringView> answering) const {
   std::vector<std::uint32_t> all(views.begin(), views.end());
   if (all.empty()) {
     all.resize(sources_.size());
     std::iota(all.begin(), all.end(), 0U);
   }
-  CandidateViews speaking{{}, std::numeric_limits<float>::infinity()};
+  ViewTable speaking;
   for (const std::uint32_t view : all) {
     check(view < sources_.size(), "a photo that may speak is one of the set");
-    speaking.views.push_back({0, view});
+    speaking.add(view, answering[view]);
   }
   return speaking;
 }
 
-WantedResolution Lumigraph::resolution_of(const View& view, const CandidateViews& speaking) const {
+WantedResolution Lumigraph::resolution_of(const View& view, const ViewTable& speaking) const {
   float finest = 0;
-  for (const CandidateView& candidate : speaking.views)
-    finest = std::max(finest, cameras_[candidate.view].fx * cameras_[candidate.view].fy);
+  for (const std::uint32_t number : speaking.numbers())
+    finest = std::max(finest, cameras_[number].fx * cameras_[number].fy);
   const auto focal2 = static_cast<float>(view.camera.fx() * view.camera.fy());
   return {std::min(focal2, finest), 0.5F * std::log2(std::max(focal2 / finest, 1.0F))};
 }
@@ -164,7 +166,7 @@ LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& opt
                                    std::span<const std::uint32_t> views) const {
   check(!options.validate(), "the lumigraph's options are valid");
   const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
-  const CandidateViews may_speak = speaking(views);
+  const ViewTable may_speak = speaking(views, answering);
   const TileFrame frame{
       view, proxy_, options, visibility_.tolerance, answering, may_speak, resolution_of(view, may_speak)};
   const int width = view.camera.width;
@@ -193,13 +195,13 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
                                               std::span<const std::uint32_t> views) const {
   const View one = pixel_of_view(view, pixel);
   const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
-  const CandidateViews may_speak = speaking(views);
+  const ViewTable may_speak = speaking(views, answering);
   std::vector<ViewWeight> weights;
   const TakeChosen take = [&](const ChosenViews& chosen) {
     if (chosen.pixel[0] < 0) return;
     for (std::size_t row = 0; row < static_cast<std::size_t>(chosen.k); ++row)
-      if (const float weight = chosen.weight[row * chosen.row_length]; weight > 0)
-        weights.push_back({chosen.view[row * chosen.row_length], weight});
+      if (const std::size_t at = row * chosen.pixel.size(); chosen.weight[at] > 0)
+        weights.push_back({chosen.view[static_cast<std::size_t>(chosen.candidate[at])], chosen.weight[at]});
   };
   const TileFrame frame{
       one, proxy_, options, visibility_.tolerance, answering, may_speak, resolution_of(view, may_speak)};

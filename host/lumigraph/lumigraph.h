@@ -21,9 +21,9 @@
 
 namespace mf {
 
-struct CandidateViews;
 struct WantedResolution;
 class TilePool;
+class ViewTable;
 
 // What a picture of the lumigraph shows: the place, or which photo speaks for what, each in a colour of its own (the
 // blending field of Buehler et al. 2001, figure 6).
@@ -55,8 +55,8 @@ struct LumigraphPicture {
 // For each pixel's ray the point X where it meets the proxy is found, and the k photos with the least penalty there
 // (ray_penalty.h) are blended at the places where they show X, with the weights of view_weights.h. The paper samples
 // these weights at some vertices and interpolates; here every pixel has its exact ones: photos are ranked for tiles of
-// the picture, then for blocks, and a photo is dropped for a tile only when no point of it can rank the photo among the
-// k + 1 best. So no grid shows, and a thousand photos cost little more than fifty.
+// the picture, then for bundles of 8 × 8 rays, and a photo is dropped for them only when no point of theirs can rank
+// the photo among the k + 1 best. So no grid shows, and a thousand photos cost less than twice as much as fifty.
 class Lumigraph {
  public:
   // Copies what it needs of the photos. Precondition: check_photos(photos).
@@ -92,8 +92,8 @@ class Lumigraph {
  private:
   void look_at_proxy(const Progress&);
   [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, const LumigraphOptions&) const;
-  [[nodiscard]] CandidateViews speaking(std::span<const std::uint32_t> views) const;
-  [[nodiscard]] WantedResolution resolution_of(const View&, const CandidateViews& speaking) const;
+  [[nodiscard]] ViewTable speaking(std::span<const std::uint32_t> views, std::span<const AnsweringView>) const;
+  [[nodiscard]] WantedResolution resolution_of(const View&, const ViewTable& speaking) const;
 
   std::vector<Source> sources_;
   std::vector<AnsweringCamera> cameras_;

@@ -83,10 +83,4 @@ void read_pictures(const std::vector<PhotoFiles>& files, std::vector<PosedPhoto>
   });
 }
 
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw InputError(folder.string(), "", "is no folder that can be made: " + error.message());
-}
-
 }  // namespace mf

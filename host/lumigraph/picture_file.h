@@ -27,7 +27,4 @@ struct PhotoFiles {
 };
 void read_pictures(const std::vector<PhotoFiles>& files, std::vector<PosedPhoto>& photos);
 
-// With all above it. Throws InputError naming it.
-void make_folder(const std::filesystem::path&);
-
 }  // namespace mf

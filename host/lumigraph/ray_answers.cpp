@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/lumigraph/ray_answers.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "host/blending/vectorized.h"
+#include "host/blending/view_weights.h"
+#include "host/lumigraph/vector_math.h"
 
 // The loops over rays are written for the compiler's vectorizer: no branch but selections, no call. (This file is
 // compiled with -fno-math-errno, -fno-trapping-math and -fno-thread-jumps, without which they stay scalar.)
@@ -21,21 +24,8 @@ constexpr float nearest = 1e-3F;  // of the depth in the new view: points nearer
 // variance 1/12; a texel is one too, and interpolation adds 1/6 on average: log₂ √3.
 constexpr float fetch_octaves = 0.7925F;
 
-// By value: the references of std::min and std::max keep a loop from being vectorized.
-inline float larger(float a, float b) {
-  return a > b ? a : b;
-}
-inline float smaller(float a, float b) {
-  return a < b ? a : b;
-}
-
-inline float smooth(float t) {
-  const float c = smaller(larger(t, 0.0F), 1.0F);
-  return c * c * (3 - 2 * c);
-}
-
 // Everything but visibility; the penalties before they are divided by the weights.
-template <bool distorted>
+template <bool distorts>
 inline __attribute__((always_inline)) void project_all(const AnsweringView& v, const RayBundle& rays,
                                                        const PenaltyOptions& o, const RayAnswers& out,
                                                        float* inverse_depth, float* plain) {
@@ -53,7 +43,6 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
   float* out_lod = out.lod.data();
   float* weight = out.weight.data();
   const auto r = v.cam_from_world;
-  const auto d = c.distortion;
   const float focal2 = c.fx * c.fy;
   const float focal2_ratio = rays.focal2 / focal2;
   const auto eye = v.eye_in_cam;
@@ -76,12 +65,10 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
     float x = xc * inverse;
     float y = yc * inverse;
     const float r2 = x * x + y * y;
-    if constexpr (distorted) {
-      const float radial = 1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
-      const float xd = x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x);
-      const float yd = y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y;
-      x = xd;
-      y = yd;
+    if constexpr (distorts) {
+      const Distorted bent = distorted(c, x, y);
+      x = bent.x;
+      y = bent.y;
     }
     const float u = c.fx * x + c.cx;
     const float w = c.fy * y + c.cy;
@@ -194,12 +181,12 @@ void divide(std::span<const float> plain, std::span<const float> weight, float g
     penalty[i] = weight[i] > 0 ? plain[i] / std::pow(weight[i], gamma) : infinite;
 }
 
-MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t rays, int rows, std::int32_t id,
-                          float* moving_penalty, std::int32_t* moving) {
+MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t row_length, std::size_t rays, int rows,
+                          std::int32_t id, float* moving_penalty, std::int32_t* moving) {
   for (std::size_t i = 0; i < rays; ++i) moving[i] = id;
   for (int row = 0; row < rows; ++row) {
-    float* row_penalty = penalty + static_cast<std::size_t>(row) * rays;
-    std::int32_t* row_candidate = candidate + static_cast<std::size_t>(row) * rays;
+    float* row_penalty = penalty + static_cast<std::size_t>(row) * row_length;
+    std::int32_t* row_candidate = candidate + static_cast<std::size_t>(row) * row_length;
 #pragma GCC ivdep  // rows don't overlap
     for (std::size_t i = 0; i < rays; ++i) {
       const float held = row_penalty[i];
@@ -212,6 +199,48 @@ MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t r
       moving_penalty[i] = better ? held : offered;
       moving[i] = better ? held_id : offered_id;
     }
+  }
+}
+
+// The largest singular value of the distortion's Jacobian, over a grid of the disc where it holds.
+float largest_stretch(const AnsweringCamera& camera) {
+  constexpr int steps = 32;         // from the middle to the rim
+  constexpr float between = 1.05F;  // for what lies between them: polynomials of degree 7 are smooth there
+  const float step = std::sqrt(camera.largest_r2) / steps;
+  float largest = 0;
+  for (int j = -steps; j <= steps; ++j)
+    for (int i = -steps; i <= steps; ++i) {
+      const auto x = static_cast<float>(i) * step;
+      const auto y = static_cast<float>(j) * step;
+      if (x * x + y * y > camera.largest_r2) continue;
+      const float h = step / 2;
+      const Distorted left = distorted(camera, x - h, y);
+      const Distorted right = distorted(camera, x + h, y);
+      const Distorted above = distorted(camera, x, y - h);
+      const Distorted below = distorted(camera, x, y + h);
+      Eigen::Matrix2f jacobian;
+      jacobian << right.x - left.x, below.x - above.x, right.y - left.y, below.y - above.y;
+      largest = std::max(largest, (jacobian / step).operatorNorm());
+    }
+  return between * largest;
+}
+
+// Sums to 1 down the rows, or is 0 in all. Precondition: `sum` is 0.
+MF_VECTORIZED void weigh(const float* penalty, std::size_t rays, int k, float floor, float* weight, float* sum) {
+  const float* threshold = penalty + static_cast<std::size_t>(k) * rays;
+  for (int row = 0; row < k; ++row) {
+    const float* row_penalty = penalty + static_cast<std::size_t>(row) * rays;
+    float* row_weight = weight + static_cast<std::size_t>(row) * rays;
+#pragma GCC ivdep  // the rows don't overlap
+    for (std::size_t i = 0; i < rays; ++i) {
+      const float w = row_penalty[i] < infinite ? ray_weight(row_penalty[i], threshold[i], floor) : 0;
+      row_weight[i] = w;
+      sum[i] += w;
+    }
+  }
+  for (int row = 0; row < k; ++row) {
+    float* row_weight = weight + static_cast<std::size_t>(row) * rays;
+    for (std::size_t i = 0; i < rays; ++i) row_weight[i] /= sum[i] > 0 ? sum[i] : 1;
   }
 }
 
@@ -247,6 +276,7 @@ AnsweringCamera answering_camera(const CameraModel& model) {
   camera.right = static_cast<float>(high.x() + spare.x());
   camera.bottom = static_cast<float>(high.y() + spare.y());
   camera.largest_r2 = camera.distorted ? static_cast<float>(1.02 * largest_r2) : infinite;
+  if (camera.distorted) camera.stretch = largest_stretch(camera);
   return camera;
 }
 
@@ -284,64 +314,42 @@ void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptio
   divide(of_bundle, out.weight, options.border, out.penalty);
 }
 
-float least_penalty(const AnsweringView& view, const RaysRegion& region, const PenaltyOptions& options) {
-  const auto& r = view.cam_from_world;
-  const AnsweringCamera& c = view.camera;
-  const Eigen::Vector3f& centre = region.centre;
-  const float radius = region.radius;
-  const float x = r[0] * centre.x() + r[1] * centre.y() + r[2] * centre.z() + view.eye_in_cam[0];
-  const float y = r[3] * centre.x() + r[4] * centre.y() + r[5] * centre.z() + view.eye_in_cam[1];
-  const float z = r[6] * centre.x() + r[7] * centre.y() + r[8] * centre.z() + view.eye_in_cam[2];
-  // Outside of a side of the picture's pyramid by more than the radius; a side's normal is (1, −limit), not of
-  // length 1.
-  const auto outside = [&](float across, float limit) {
-    return across - limit * z > radius * std::sqrt(1 + limit * limit);
-  };
-  if (z < -radius || outside(x, c.right) || outside(-x, -c.left) || outside(y, c.bottom) || outside(-y, -c.top))
-    return infinite;
-
-  const Eigen::Vector3f from_centre = centre + Eigen::Map<const Eigen::Vector3f>(view.eye_from_centre.data());
-  const float to_view = from_centre.norm();
-  const float to_eye = centre.norm();
-  const float nearest_view = to_view - radius;
-  const float nearest_eye = to_eye - radius;
-  if (!(nearest_view > 0 && nearest_eye > 0)) return view.time_penalty;
-  // The chord u − v changes with X at a rate of at most |1/|X−C| − 1/|X−E|| + |u − v| / max(|X−C|, |X−E|).
-  const float chord = (from_centre / to_view - centre / to_eye).norm();
-  const float largest_chord = std::min(2.0F, chord + 2 * radius / std::min(nearest_view, nearest_eye));
-  const float rate = (std::abs(to_view - to_eye) + radius * largest_chord) / (nearest_view * nearest_eye) +
-                     largest_chord / std::max(nearest_view, nearest_eye);
-  const float angle_and_time = options.angle * std::max(0.0F, chord - radius * rate) + view.time_penalty;
-  // The photo's cosine is at most the ray's and the chord. Its area falls with depth: the nearest counts.
-  const float nearest_z = z - radius;
-  if (!(nearest_z > 0)) return angle_and_time;
-  const float cosines = 1 + (chord + radius * rate) / region.least_cosine;
-  const float area_ratio =
-      region.least_area * nearest_z * nearest_z * nearest_z / (c.fx * c.fy * (to_view + radius) * cosines);
-  constexpr float slip = 1e-4F;  // octaves: above the approximation of the logarithm
-  return angle_and_time +
-         options.resolution * std::max(0.0F, 0.5F * approximate_log2(std::max(area_ratio, 1e-30F)) - slip);
-}
-
-MF_VECTORIZED bool any_reaches(std::span<const float> penalty, float bound) {
-  const float* values = penalty.data();
-  int reached = 0;
-  for (std::size_t i = 0; i < penalty.size(); ++i) reached |= values[i] >= bound ? 1 : 0;
-  return reached != 0;
-}
-
 void clear(const LeastPenalties& least) {
   std::fill(least.penalty.begin(), least.penalty.end(), infinite);
   std::fill(least.candidate.begin(), least.candidate.end(), -1);
 }
 
-void add_candidate(const LeastPenalties& least, std::int32_t candidate, std::span<const float> penalty) {
-  if (!any_below(penalty.data(), worst_of(least).data(), least.rays)) return;
+bool add_candidate(const LeastPenalties& least, std::int32_t candidate, std::size_t first,
+                   std::span<const float> penalty) {
+  if (!any_below(penalty.data(), worst_of(least).data() + first, penalty.size())) return false;
   alignas(64) std::array<float, largest_bundle> moving_penalty;
   alignas(64) std::array<std::int32_t, largest_bundle> moving;
   std::copy(penalty.begin(), penalty.end(), moving_penalty.begin());
-  insert(least.penalty.data(), least.candidate.data(), least.rays, least.k + 1, candidate, moving_penalty.data(),
-         moving.data());
+  insert(least.penalty.data() + first, least.candidate.data() + first, least.rays, penalty.size(), least.k + 1,
+         candidate, moving_penalty.data(), moving.data());
+  return true;
+}
+
+MF_VECTORIZED PenaltyRange range_of(std::span<const float> penalty) {
+  // A minimum in each lane: that of a whole loop would be taken one by one.
+  alignas(64) std::array<float, ray_lanes> least;
+  least.fill(infinite);
+  PenaltyRange range;
+  for (std::size_t first = 0; first < penalty.size(); first += ray_lanes) {
+    const float* values = penalty.data() + first;
+    for (std::size_t lane = 0; lane < ray_lanes; ++lane) least[lane] = smaller(least[lane], values[lane]);
+    const float a = larger(larger(values[0], values[1]), larger(values[2], values[3]));
+    const float b = larger(larger(values[4], values[5]), larger(values[6], values[7]));
+    range.of_lanes[first / ray_lanes] = larger(a, b);
+    range.largest = larger(range.largest, larger(a, b));
+  }
+  range.least = *std::min_element(least.begin(), least.end());
+  return range;
+}
+
+void ray_weights(const LeastPenalties& least, float floor, std::span<float> weight) {
+  alignas(64) std::array<float, largest_bundle> sum{};
+  weigh(least.penalty.data(), least.rays, least.k, floor, weight.data(), sum.data());
 }
 
 }  // namespace mf

@@ -12,6 +12,7 @@
 namespace mf {
 
 inline constexpr std::size_t largest_bundle = 64;  // rays
+inline constexpr std::size_t ray_lanes = 8;        // rays that are handled side by side: bundles of a multiple are fast
 
 // Cosines between normal and ray count as at least this: a patch seen edge-on covers no pixels, and where normals are
 // interpolated or noisy that says nothing about resolution.
@@ -37,8 +38,21 @@ struct AnsweringCamera {
   // the distortion's model folds back into the picture.
   float left = 0, right = 0, top = 0, bottom = 0;
   float largest_r2 = 0;
+  float stretch = 1;  // by at most so much distortion lengthens a step up to there
 };
 [[nodiscard]] AnsweringCamera answering_camera(const CameraModel&);
+
+// Normalized coordinates as the photo has them.
+struct Distorted {
+  float x = 0, y = 0;
+};
+[[nodiscard]] inline Distorted distorted(const AnsweringCamera& c, float x, float y) {
+  const auto& d = c.distortion;
+  const float r2 = x * x + y * y;
+  const float radial = 1 + r2 * (d[0] + r2 * (d[1] + r2 * d[4]));
+  return {x * radial + 2 * d[2] * x * y + d[3] * (r2 + 2 * x * x),
+          y * radial + d[2] * (r2 + 2 * y * y) + 2 * d[3] * x * y};
+}
 
 // A photo as the rays of one new view see it: single precision suffices because everything is relative to E.
 struct AnsweringView {
@@ -72,18 +86,6 @@ struct RayAnswers {
 void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance,
             std::span<const float> worst, const RayAnswers&);
 
-// Proxy points that rays of the new view meet, as a whole: in a sphere.
-struct RaysRegion {
-  Eigen::Vector3f centre = Eigen::Vector3f::Zero();  // relative to E
-  float radius = 0;
-  float least_cosine = 1;  // of the angle between ray and normal, either side
-  float least_area = 0;    // px² of the new view that a patch of 1 m² across the ray covers: f² |X−E| / z³
-};
-
-// No point of the region gives the photo a smaller penalty; infinite when none of them lies in its picture. Visibility
-// is not looked at: it only raises penalties.
-[[nodiscard]] float least_penalty(const AnsweringView&, const RaysRegion&, const PenaltyOptions&);
-
 // The k + 1 least penalties of each ray, in rising order, and which candidate has them. One ray a column.
 struct LeastPenalties {
   std::span<float> penalty;           // (k + 1) rows
@@ -95,7 +97,18 @@ void clear(const LeastPenalties&);
 [[nodiscard]] inline std::span<const float> worst_of(const LeastPenalties& least) {
   return least.penalty.subspan(static_cast<std::size_t>(least.k) * least.rays, least.rays);
 }
-[[nodiscard]] bool any_reaches(std::span<const float> penalty, float bound);
-void add_candidate(const LeastPenalties&, std::int32_t candidate, std::span<const float> penalty);
+// `penalty` is of the rays from `first` on. Whether it is among any ray's best.
+bool add_candidate(const LeastPenalties&, std::int32_t candidate, std::size_t first, std::span<const float> penalty);
+
+// Of full lanes of penalties. `of_lanes`: the largest of each ray_lanes neighbours.
+struct PenaltyRange {
+  float least = 0;
+  float largest = 0;
+  std::array<float, largest_bundle / ray_lanes> of_lanes{};
+};
+[[nodiscard]] PenaltyRange range_of(std::span<const float> penalty);
+
+// What each of the k best of a ray weighs, k rows: view_weights.h. Without candidates all are 0.
+void ray_weights(const LeastPenalties&, float floor, std::span<float> weight);
 
 }  // namespace mf

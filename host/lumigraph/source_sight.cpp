@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "common/check.h"
 #include "host/lumigraph/area_average.h"
 #include "host/lumigraph/proxy_rays.h"
 
@@ -92,6 +94,47 @@ void set_depth(SourceSight& sight, const CameraModel& camera, const Rigid3& cam_
   }
 }
 
+void trust_mask(SourceSight& sight, const ImageU8& mask) {
+  const ImageU8 small = area_average(mask, sight.width, sight.height);
+  for (std::size_t i = 0; i < sight.texels.size(); ++i)
+    sight.texels[i] = SourceSight::texel(sight.texels[i] >> 16U, (sight.texels[i] & 0xFFFFU) * small.data[i] / 255);
+}
+
+SourceSight::Cell bounding(SourceSight::Cell a, SourceSight::Cell b) {
+  return {std::min(a.least_inverse_depth, b.least_inverse_depth), std::max(a.largest_trust, b.largest_trust)};
+}
+
+SourceSight::Cell cell_of(SourceSight::Texel texel) {
+  return {static_cast<std::uint8_t>((texel >> 16U) / 257), static_cast<std::uint8_t>(((texel & 0xFFFFU) + 256) / 257)};
+}
+
+// Appends cells, each of two by two of `fine`, whose last row and column are repeated where their number is odd.
+template <typename Fine>
+SourceSight::Level add_level(SourceSight& sight, int fine_width, int fine_height, const Fine& fine) {
+  const auto at = [&](int x, int y) { return fine(std::min(x, fine_width - 1), std::min(y, fine_height - 1)); };
+  const SourceSight::Level level{(fine_width + 1) / 2, static_cast<std::int32_t>(sight.cells.size())};
+  for (int y = 0; y < fine_height; y += 2)
+    for (int x = 0; x < fine_width; x += 2)
+      sight.cells.push_back(bounding(bounding(at(x, y), at(x + 1, y)), bounding(at(x, y + 1), at(x + 1, y + 1))));
+  return level;
+}
+
+void add_levels(SourceSight& sight) {
+  sight.levels[0] = add_level(sight, sight.width, sight.height, [&](int x, int y) {
+    return cell_of(sight.texels[static_cast<std::size_t>(y) * static_cast<std::size_t>(sight.width) +
+                                static_cast<std::size_t>(x)]);
+  });
+  int height = (sight.height + 1) / 2;
+  for (std::size_t i = 0; sight.levels[i].width > 1 || height > 1; ++i) {
+    check(i + 1 < sight.levels.size(), "a photo has fewer pixels than its sight has levels for");
+    const SourceSight::Level level = sight.levels[i];
+    sight.levels[i + 1] = add_level(sight, level.width, height, [&](int x, int y) {
+      return sight.cells[static_cast<std::size_t>(level.first + y * level.width + x)];
+    });
+    height = (height + 1) / 2;
+  }
+}
+
 }  // namespace
 
 std::optional<std::string> VisibilityOptions::validate() const {
@@ -110,11 +153,21 @@ SourceSight make_sight(const CameraModel& camera, const Rigid3& cam_from_world, 
   sight.texels.assign(static_cast<std::size_t>(sight.width) * static_cast<std::size_t>(sight.height),
                       SourceSight::texel(0, static_cast<std::uint32_t>(code_range)));
   if (hides_itself(proxy)) set_depth(sight, camera, cam_from_world, proxy, options);
-  if (mask.empty()) return sight;
-  const ImageU8 small = area_average(mask, sight.width, sight.height);
-  for (std::size_t i = 0; i < sight.texels.size(); ++i)
-    sight.texels[i] = SourceSight::texel(sight.texels[i] >> 16U, (sight.texels[i] & 0xFFFFU) * small.data[i] / 255);
+  if (!mask.empty()) trust_mask(sight, mask);
+  add_levels(sight);
   return sight;
+}
+
+// The level is the finest at which the rectangle lies in three by three cells.
+SourceSight::Bounds SourceSight::bounds(int x0, int y0, int x1, int y1) const {
+  const auto longest = static_cast<unsigned>(std::max({x1 - x0, y1 - y0, 3}));
+  const auto log2_side = static_cast<unsigned>(std::bit_width((longest - 1) / 2));  // ≥ 1
+  const Level& level = levels[log2_side - 1];
+  Cell all{0xFF, 0};
+  for (int y = y0 >> log2_side; y <= y1 >> log2_side; ++y)
+    for (int x = x0 >> log2_side; x <= x1 >> log2_side; ++x)
+      all = bounding(all, cells[static_cast<std::size_t>(level.first + y * level.width + x)]);
+  return {scale / 255 * static_cast<float>(all.least_inverse_depth), static_cast<float>(all.largest_trust) / 255};
 }
 
 }  // namespace mf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -33,8 +34,28 @@ struct SourceSight {
   int width = 0;
   int height = 0;
   float texels_per_px = 1;
-  float scale = 0;  // inverse depth of code 65535, 1/m
-  std::vector<Texel> texels;
+  float scale = 0;            // inverse depth of code 65535, 1/m
+  std::vector<Texel> texels;  // width · height
+
+  // What bounds are told from, small enough to stay near the processor for a thousand photos: cells of 2, 4, 8 ...
+  // texels a side, row by row, the finest level first.
+  struct Cell {
+    std::uint8_t least_inverse_depth = 0;  // 255 at `scale`, rounded down
+    std::uint8_t largest_trust = 0;        // 255 at 1, rounded up
+  };
+  struct Level {
+    std::int32_t width = 0;
+    std::int32_t first = 0;  // of the cells
+  };
+  std::vector<Cell> cells;
+  std::array<Level, 16> levels;  // up to pictures of 2^17 pixels
+
+  // No place between the texels of the rectangle, corners included, shows less inverse depth or more trust.
+  struct Bounds {
+    float least_inverse_depth = 0;  // 1/m
+    float largest_trust = 0;        // 0…1
+  };
+  [[nodiscard]] Bounds bounds(int x0, int y0, int x1, int y1) const;
 
   [[nodiscard]] bool empty() const { return texels.empty(); }
 };

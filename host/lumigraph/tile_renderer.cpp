@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "host/blending/view_weights.h"
 #include "host/lumigraph/proxy_rays.h"
@@ -14,59 +15,45 @@ namespace mf {
 namespace {
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-constexpr int block_side = 16;        // pixels: photos are ranked for 256 rays at a time
+constexpr int bundle_side = 8;        // pixels
 constexpr std::size_t samples = 16;   // rays that stand for a tile when its bound is guessed
 constexpr float bound_slack = 1.03F;  // on the guess: fewer rays are ranked twice
 constexpr float same_ray = 1e-6F;     // radians: what single precision leaves of an angle of 0
+static_assert(bundle_side * bundle_side <= largest_bundle);
 
-// The points of some rays: one region, or two where a silhouette parts them into near and far ones, so that neither is
-// much larger than its part of the picture.
-class Regions {
- public:
-  explicit Regions(const RayBundle& rays) {
-    const auto [nearest, farthest] = std::minmax_element(rays.depth.begin(), rays.depth.end());
-    // Not worth twice the work for a surface at a slant.
-    constexpr float parted = 1.2F;
-    const float middle = *farthest > parted * *nearest ? std::sqrt(*nearest * *farthest) : infinite;
-    for (std::size_t i = 0; i < rays.depth.size(); ++i) parts_[rays.depth[i] > middle ? 1 : 0].add(rays, i);
-  }
+// The distance, in lengths of the directions, that parts near points from far ones, so that neither fill a much larger
+// box than their part of the picture does; infinite: not worth twice the work, as for a surface at a slant.
+float parting_depth(float nearest, float farthest) {
+  constexpr float parted = 1.2F;
+  return farthest > parted * nearest ? std::sqrt(nearest * farthest) : infinite;
+}
 
-  // Nothing less is possible for the photo at any of the rays.
-  [[nodiscard]] float least(const AnsweringView& view, const PenaltyOptions& options) const {
-    float least = infinite;
-    for (const Part& part : parts_)
-      if (part.low.x() <= part.high.x()) least = std::min(least, least_penalty(view, part.region(), options));
-    return least;
-  }
+RayBundle part_of(const RayBundle& rays, std::size_t first, std::size_t count) {
+  const auto part = [&](std::span<const float> values) { return values.subspan(first, count); };
+  return {part(rays.dx), part(rays.dy), part(rays.dz), part(rays.depth), part(rays.nx),
+          part(rays.ny), part(rays.nz), rays.focal2,   rays.beyond};
+}
 
- private:
-  struct Part {
-    Eigen::Vector3f low = Eigen::Vector3f::Constant(infinite);
-    Eigen::Vector3f high = Eigen::Vector3f::Constant(-infinite);
-    float least_cosine = 1;
-    float least_area = infinite;
-
-    void add(const RayBundle& rays, std::size_t i) {
-      const Eigen::Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
-      const float length = d.norm();
-      low = low.cwiseMin(rays.depth[i] * d);
-      high = high.cwiseMax(rays.depth[i] * d);
-      const float along = std::abs(d.dot(Eigen::Vector3f(rays.nx[i], rays.ny[i], rays.nz[i]))) / length;
-      least_cosine = std::min(least_cosine, std::max(along, edge_on_cosine));
-      least_area = std::min(least_area, rays.focal2 * length / (rays.depth[i] * rays.depth[i]));
-    }
-    [[nodiscard]] RaysRegion region() const {
-      return {(low + high) / 2, (high - low).norm() / 2, least_cosine, least_area};
-    }
-  };
-  std::array<Part, 2> parts_;
-};
+float of_weight(float penalty, float weight, float gamma) {
+  if (!(weight > 0)) return infinite;
+  return penalty / (gamma == 0.5F ? std::sqrt(weight) : std::pow(weight, gamma));
+}
 
 }  // namespace
 
 void TileRays::resize(std::size_t count) {
   for (auto* values : {&dx, &dy, &dz, &depth, &nx, &ny, &nz}) values->resize(count);
   pixel.resize(count);
+}
+
+void TileRays::fill_lanes(std::size_t first) {
+  const std::size_t end = size();
+  const std::size_t lanes = (end - first + ray_lanes - 1) / ray_lanes * ray_lanes;
+  resize(first + lanes);
+  for (std::size_t i = end; i < size(); ++i) {
+    copy(end - 1, *this, i);
+    pixel[i] = -1;
+  }
 }
 
 void TileRays::copy(std::size_t from, const TileRays& source, std::size_t to) {
@@ -86,49 +73,43 @@ RayBundle TileRays::bundle(std::size_t first, std::size_t count, const WantedRes
 }
 
 TileRenderer::TileRenderer(const TileFrame& frame, TileBuffers& buffers, const TakeChosen& take)
-    : frame_(frame), buffers_(buffers), take_(take), plain_camera_(!frame.view.camera.has_distortion()) {
+    : frame_(frame),
+      buffers_(buffers),
+      take_(take),
+      plain_camera_(!frame.view.camera.has_distortion()),
+      world_from_cam_(frame.view.cam_from_world.inverse()),
+      axes_(world_from_cam_.rotation.toRotationMatrix().cast<float>()) {
   const auto entries = static_cast<std::size_t>(frame.options.penalty.k + 1) * largest_bundle;
   buffers.least_penalty.resize(entries);
   buffers.least_candidate.resize(entries);
-  for (auto* values :
-       {&buffers.chosen_weight, &buffers.chosen_sight, &buffers.chosen_x, &buffers.chosen_y, &buffers.chosen_lod})
-    values->resize(entries);
-  buffers.chosen_view.resize(entries);
+  buffers.chosen_weight.resize(entries);
   buffers.pixel.resize(largest_bundle);
 }
 
 void TileRenderer::render(int x0, int y0) {
   shoot(x0, y0);
-  const TileRays& rays = buffers_.rays;
-  if (rays.size() == 0) return;
-  rank_for_tile();
-  for (const Region& block : blocks_) {
-    if (block.first == block.end) continue;
-    bound_from_below(rays, block, buffers_.of_tile, buffers_.of_tile.bound, buffers_.of_block);
-    for (std::size_t first = block.first; first < block.end; first += largest_bundle)
-      choose(rays, {first, std::min(block.end, first + largest_bundle)}, buffers_.of_block);
-  }
+  if (bundles_.empty()) return;
+  choose_for_tile();
+  for (const Bundle& bundle : bundles_) choose(bundle);
 }
 
 void TileRenderer::shoot(int x0, int y0) {
   buffers_.rays.resize(0);
-  blocks_.clear();
+  bundles_.clear();
   const int x1 = std::min(x0 + tile_side, frame_.view.camera.width);
   const int y1 = std::min(y0 + tile_side, frame_.view.camera.height);
-  for (int y = y0; y < y1; y += block_side)
-    for (int x = x0; x < x1; x += block_side)
-      shoot_block(x, y, std::min(x + block_side, x1), std::min(y + block_side, y1));
+  for (int y = y0; y < y1; y += bundle_side)
+    for (int x = x0; x < x1; x += bundle_side)
+      shoot_bundle(x, y, std::min(x + bundle_side, x1), std::min(y + bundle_side, y1));
 }
 
-// Rays that meet the proxy stay.
-void TileRenderer::shoot_block(int x0, int y0, int x1, int y1) {
+// Rays that meet the proxy stay, as one bundle or, where a silhouette parts them, as two.
+void TileRenderer::shoot_bundle(int x0, int y0, int x1, int y1) {
   const CameraModel& camera = frame_.view.camera;
-  const Rigid3 world_from_cam = frame_.view.cam_from_world.inverse();
-  const Eigen::Matrix3d rotation = world_from_cam.rotation.toRotationMatrix();
-  TileRays& rays = buffers_.rays;
-  const std::size_t first = rays.size();
-  rays.resize(first + static_cast<std::size_t>((x1 - x0) * (y1 - y0)));
-  std::size_t end = first;
+  const Eigen::Matrix3d rotation = world_from_cam_.rotation.toRotationMatrix();
+  TileRays& rays = buffers_.some;
+  rays.resize(static_cast<std::size_t>((x1 - x0) * (y1 - y0)));
+  std::size_t count = 0;
   for (int y = y0; y < y1; ++y)
     for (int x = x0; x < x1; ++x) {
       Eigen::Vector3d ray((x + 0.5 - camera.cx()) / camera.fx(), (y + 0.5 - camera.cy()) / camera.fy(), 1);
@@ -138,123 +119,189 @@ void TileRenderer::shoot_block(int x0, int y0, int x1, int y1) {
         ray = *undistorted;
       }
       const Eigen::Vector3f d = (rotation * ray).cast<float>();
-      rays.dx[end] = d.x();
-      rays.dy[end] = d.y();
-      rays.dz[end] = d.z();
-      rays.pixel[end++] = y * camera.width + x;
+      rays.dx[count] = d.x();
+      rays.dy[count] = d.y();
+      rays.dz[count] = d.z();
+      rays.pixel[count++] = y * camera.width + x;
     }
-  const auto part = [&](std::vector<float>& values) { return std::span(values).subspan(first, end - first); };
-  trace(frame_.proxy, {world_from_cam.translation.cast<float>(), part(rays.dx), part(rays.dy), part(rays.dz),
-                       part(rays.depth), part(rays.nx), part(rays.ny), part(rays.nz)});
-  std::size_t kept = first;
-  for (std::size_t i = first; i < end; ++i)
-    if (rays.depth[i] < infinite) rays.copy(i, rays, kept++);
-  rays.resize(kept);
-  blocks_.push_back({first, kept});
-}
-
-void TileRenderer::bound_from_below(const TileRays& rays, const Region& region, const CandidateViews& from, float below,
-                                    CandidateViews& to) {
-  const Regions regions(rays.bundle(region.first, region.end - region.first, frame_.wanted));
-  to.bound = below;
-  to.views.clear();
-  for (const CandidateView& candidate : from.views) {
-    if (candidate.least > below) break;
-    const float least = regions.least(frame_.views[candidate.view], frame_.options.penalty);
-    if (least < infinite && least <= below) to.views.push_back({least, candidate.view});
+  rays.resize(count);
+  trace(frame_.proxy,
+        {world_from_cam_.translation.cast<float>(), rays.dx, rays.dy, rays.dz, rays.depth, rays.nx, rays.ny, rays.nz});
+  float nearest = infinite;
+  float farthest = 0;
+  for (const float depth : rays.depth) {
+    nearest = std::min(nearest, depth);
+    if (depth < infinite) farthest = std::max(farthest, depth);
   }
-  std::sort(to.views.begin(), to.views.end(),
-            [](const CandidateView& a, const CandidateView& b) { return a.least < b.least; });
+  const float middle = parting_depth(nearest, farthest);
+  const auto add = [&](float from, float to) {
+    TileRays& all = buffers_.rays;
+    const std::size_t first = all.size();
+    all.resize(first + count);
+    std::size_t end = first;
+    for (std::size_t i = 0; i < count; ++i)
+      if (rays.depth[i] >= from && rays.depth[i] < to) all.copy(i, rays, end++);
+    all.resize(end);
+    if (end > first) add_bundle(first);
+  };
+  add(0, middle);
+  if (middle < infinite) add(middle, infinite);
 }
 
-void TileRenderer::rank_for_tile() {
-  const TileRays& rays = buffers_.rays;
-  TileRays& picked = buffers_.some;
+void TileRenderer::add_bundle(std::size_t first) {
+  TileRays& rays = buffers_.rays;
+  rays.fill_lanes(first);
+  const std::size_t end = rays.size();
+  bundles_.push_back({first, end, box_of(rays.bundle(first, end - first, frame_.wanted), axes_)});
+}
+
+// Near and far points apart, as in bundles.
+void TileRenderer::bound_for_tile() {
+  TileBuffers& b = buffers_;
+  const auto [nearest, farthest] = std::minmax_element(b.rays.depth.begin(), b.rays.depth.end());
+  const float middle = parting_depth(*nearest, *farthest);
+  std::array<RaysBox, 2> parts;
+  for (const Bundle& bundle : bundles_) parts[b.rays.depth[bundle.first] > middle ? 1 : 0].extend(bundle.box);
+  b.least.assign(frame_.speaking.size(), infinite);
+  b.of_part.resize(frame_.speaking.size());
+  for (const RaysBox& part : parts) {
+    if (part.empty()) continue;
+    least_penalties(frame_.speaking, part, frame_.options.penalty, b.of_part);
+    for (std::size_t i = 0; i < b.least.size(); ++i) b.least[i] = std::min(b.least[i], b.of_part[i]);
+  }
+}
+
+// Some rays rank the photos in the order of what no ray of the tile undercuts, until none that is left can be among
+// their k + 1 best; what they need is the tile's bound.
+void TileRenderer::choose_for_tile() {
+  TileBuffers& b = buffers_;
+  bound_for_tile();
+  b.heap.clear();
+  for (std::uint32_t row = 0; row < b.least.size(); ++row)
+    if (b.least[row] < infinite) b.heap.push_back(row);
+  const auto later = [&b](std::uint32_t one, std::uint32_t other) { return b.least[one] > b.least[other]; };
+  std::make_heap(b.heap.begin(), b.heap.end(), later);
+  b.near.clear();
+  const auto next_up_to = [&](float bound) -> std::optional<std::uint32_t> {
+    if (b.heap.empty() || b.least[b.heap.front()] > bound) return std::nullopt;
+    std::pop_heap(b.heap.begin(), b.heap.end(), later);
+    const std::uint32_t row = b.heap.back();
+    b.heap.pop_back();
+    b.near.add(frame_.speaking, row);
+    return row;
+  };
+  TileRays& picked = b.some;
   picked.resize(samples);
-  for (std::size_t i = 0; i < samples; ++i) picked.copy(i * (rays.size() - 1) / (samples - 1), rays, i);
-  CandidateViews& of_tile = buffers_.of_tile;
-  bound_from_below(rays, {0, rays.size()}, frame_.speaking, infinite, of_tile);
-  rank(picked.bundle(0, samples, frame_.wanted), of_tile);
-  const auto worst = worst_of({buffers_.least_penalty, buffers_.least_candidate, samples, frame_.options.penalty.k});
-  of_tile.bound = bound_slack * *std::max_element(worst.begin(), worst.end());
+  for (std::size_t i = 0; i < samples; ++i) picked.copy(i * (b.rays.size() - 1) / (samples - 1), b.rays, i);
+  start_ranking(picked.bundle(0, samples, frame_.wanted));
+  while (const auto row = next_up_to(worst_.largest)) rank(frame_.speaking.numbers()[*row], b.least[*row]);
+  keep_best();
+  bound_ = bound_slack * worst_.largest;
+  while (next_up_to(bound_)) {
+  }
 }
 
-// Stops at the first candidate that no ray can prefer to what it has: the rest are no better.
-void TileRenderer::rank(const RayBundle& bundle, const CandidateViews& candidates) {
+// Ranks those photos of the table that some ray could give a penalty below `bound` and prefer: first the best of the
+// rays before, whose penalties then show of most others by their bounds alone that they are not among the best here.
+void TileRenderer::rank_all(const RayBundle& bundle, const RaysBox& box, const ViewTable& table, float bound) {
   TileBuffers& b = buffers_;
-  const std::size_t count = bundle.dx.size();
-  const LeastPenalties least{b.least_penalty, b.least_candidate, count, frame_.options.penalty.k};
-  clear(least);
-  for (std::size_t c = 0; c < candidates.views.size(); ++c) {
-    if (!any_reaches(worst_of(least), candidates.views[c].least)) return;
-    const std::size_t needed = (c + 1) * count;
-    for (auto* values : {&b.x, &b.y, &b.lod, &b.weight, &b.penalty})
-      if (values->size() < needed) values->resize(2 * needed);
-    const auto row = [&](std::vector<float>& values) { return std::span(values).subspan(c * count, count); };
-    const RayAnswers answers{row(b.x), row(b.y), row(b.lod), row(b.weight), row(b.penalty)};
-    answer(frame_.views[candidates.views[c].view], bundle, frame_.options.penalty, frame_.depth_tolerance,
-           worst_of(least), answers);
-    add_candidate(least, static_cast<std::int32_t>(c), answers.penalty);
+  start_ranking(bundle);
+  for (const std::uint32_t view : b.likely) rank(view, 0);
+  b.least.resize(table.size());
+  least_penalties(table, box, frame_.options.penalty, b.least);
+  const RaysCorners corners = corners_of(box, axes_);
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const float reach = std::min(worst_.largest, bound);
+    if (!(b.least[i] < reach)) continue;
+    const std::uint32_t view = table.numbers()[i];
+    const float weight = largest_weight(frame_.views[view], corners, frame_.depth_tolerance);
+    const float least = of_weight(b.least[i], weight, frame_.options.penalty.border);
+    if (least < reach && !is_likely(view)) rank(view, least);
   }
+  keep_best();
 }
 
-void TileRenderer::choose(const TileRays& rays, const Region& region, const CandidateViews& candidates) {
-  const std::size_t count = region.end - region.first;
-  rank(rays.bundle(region.first, count, frame_.wanted), candidates);
-  for (std::size_t i = 0; i < count; ++i) buffers_.pixel[i] = rays.pixel[region.first + i];
-  if (candidates.bound == infinite) {
-    hand_on(count, candidates);
-    return;
-  }
-  const auto worst = worst_of({buffers_.least_penalty, buffers_.least_candidate, count, frame_.options.penalty.k});
-  TileRays& again = buffers_.some;
+bool TileRenderer::is_likely(std::uint32_t view) const {
+  return std::find(buffers_.likely.begin(), buffers_.likely.end(), view) != buffers_.likely.end();
+}
+
+// The photos that are among some ray's k + 1 best.
+void TileRenderer::keep_best() {
+  TileBuffers& b = buffers_;
+  b.is_best.assign(b.view.size(), 0);
+  for (std::size_t i = 0; i < ranking_.rays * static_cast<std::size_t>(ranking_.k + 1); ++i)
+    if (b.least_candidate[i] >= 0) b.is_best[static_cast<std::size_t>(b.least_candidate[i])] = 1;
+  b.likely.clear();
+  for (std::size_t c = 0; c < b.view.size(); ++c)
+    if (b.is_best[c] != 0) b.likely.push_back(b.view[c]);
+}
+
+void TileRenderer::start_ranking(const RayBundle& bundle) {
+  TileBuffers& b = buffers_;
+  bundle_ = bundle;
+  ranking_ = {b.least_penalty, b.least_candidate, bundle.dx.size(), frame_.options.penalty.k};
+  clear(ranking_);
+  worst_ = range_of(worst_of(ranking_));
+  b.view.clear();
+}
+
+// The rays between the first and the last that could give the photo a penalty above `least` and yet prefer it.
+void TileRenderer::rank(std::uint32_t view, float least) {
+  TileBuffers& b = buffers_;
+  std::size_t first = 0;
+  std::size_t end = ranking_.rays;
+  while (first < end && worst_.of_lanes[first / ray_lanes] <= least) first += ray_lanes;
+  while (first < end && worst_.of_lanes[(end - 1) / ray_lanes] <= least) end -= ray_lanes;
+  if (first == end) return;
+  const std::size_t count = end - first;
+  const std::size_t candidate = b.view.size();
+  const std::size_t needed = (candidate + 1) * ranking_.rays;
+  for (auto* values : {&b.x, &b.y, &b.lod, &b.weight, &b.penalty})
+    if (values->size() < needed) values->resize(2 * needed);
+  const auto part = [&](std::vector<float>& values) {
+    return std::span(values).subspan(candidate * ranking_.rays + first, count);
+  };
+  const RayAnswers answers{part(b.x), part(b.y), part(b.lod), part(b.weight), part(b.penalty)};
+  answer(frame_.views[view], part_of(bundle_, first, count), frame_.options.penalty, frame_.depth_tolerance,
+         worst_of(ranking_).subspan(first, count), answers);
+  if (!add_candidate(ranking_, static_cast<std::int32_t>(candidate), first, answers.penalty)) return;
+  b.view.push_back(view);
+  worst_ = range_of(worst_of(ranking_));
+}
+
+void TileRenderer::choose(const Bundle& bundle) {
+  TileBuffers& b = buffers_;
+  const std::size_t count = bundle.end - bundle.first;
+  rank_all(b.rays.bundle(bundle.first, count, frame_.wanted), bundle.box, b.near, bound_);
+  const auto worst = worst_of(ranking_);
+  TileRays& again = b.some;
   again.resize(0);
-  float bound = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    if (worst[i] <= candidates.bound) continue;
+    b.pixel[i] = b.rays.pixel[bundle.first + i];
+    if (worst[i] <= bound_ || b.pixel[i] < 0) continue;
     again.resize(again.size() + 1);
-    again.copy(region.first + i, rays, again.size() - 1);
-    bound = std::max(bound, worst[i]);
-    buffers_.pixel[i] = -1;
+    again.copy(bundle.first + i, b.rays, again.size() - 1);
+    b.pixel[i] = -1;
   }
-  hand_on(count, candidates);
-  if (again.size() > 0) choose_again(bound);
+  hand_on();
+  if (again.size() > 0) choose_again();
 }
 
-// A photo whose penalty is above `bound` everywhere is among no ray's k + 1 best: each has as many below already.
-void TileRenderer::choose_again(float bound) {
-  const TileRays& rays = buffers_.some;
-  const Region region{0, rays.size()};
-  bound_from_below(rays, region, buffers_.of_tile, bound, buffers_.again);
-  buffers_.again.bound = infinite;  // these are all that can matter
-  choose(rays, region, buffers_.again);
-}
-
-void TileRenderer::hand_on(std::size_t count, const CandidateViews& candidates) {
+// The best of the tile's photos are ranked before all others: their bounds need only beat those.
+void TileRenderer::choose_again() {
   TileBuffers& b = buffers_;
-  const auto k = static_cast<std::size_t>(frame_.options.penalty.k);
-  for (std::size_t i = 0; i < count; ++i) {
-    const float threshold = b.least_penalty[k * count + i];
-    float sum = 0;
-    b.chosen_sight[i] = 0;
-    for (std::size_t row = 0; row < k; ++row) {
-      const std::size_t at = row * count + i;
-      const std::int32_t candidate = b.least_candidate[at];
-      b.chosen_weight[at] = candidate < 0 ? 0 : ray_weight(b.least_penalty[at], threshold, same_ray);
-      sum += b.chosen_weight[at];
-      if (candidate < 0) continue;
-      const std::size_t answer_at = static_cast<std::size_t>(candidate) * count + i;
-      b.chosen_view[at] = candidates.views[static_cast<std::size_t>(candidate)].view;
-      b.chosen_x[at] = b.x[answer_at];
-      b.chosen_y[at] = b.y[answer_at];
-      b.chosen_lod[at] = b.lod[answer_at];
-      b.chosen_sight[i] = std::max(b.chosen_sight[i], b.weight[answer_at]);
-    }
-    if (sum > 0)
-      for (std::size_t row = 0; row < k; ++row) b.chosen_weight[row * count + i] /= sum;
-  }
-  take_({std::span(b.pixel).first(count), count, frame_.options.penalty.k, b.chosen_weight, b.chosen_sight,
-         b.chosen_view, b.chosen_x, b.chosen_y, b.chosen_lod});
+  b.some.fill_lanes(0);
+  std::copy(b.some.pixel.begin(), b.some.pixel.end(), b.pixel.begin());
+  const RayBundle rays = b.some.bundle(0, b.some.size(), frame_.wanted);
+  rank_all(rays, box_of(rays, axes_), frame_.speaking, infinite);
+  hand_on();
+}
+
+void TileRenderer::hand_on() {
+  TileBuffers& b = buffers_;
+  ray_weights(ranking_, same_ray, b.chosen_weight);
+  take_({std::span(b.pixel).first(ranking_.rays), ranking_.k, b.chosen_weight, b.least_candidate, b.view, b.x, b.y,
+         b.lod, b.weight});
 }
 
 }  // namespace mf

@@ -11,18 +11,19 @@
 
 #include "host/lumigraph/lumigraph.h"
 #include "host/lumigraph/ray_answers.h"
+#include "host/lumigraph/view_bounds.h"
 
 namespace mf {
 
-// The photos that speak for some rays: k of them each, by rows, a ray a column.
+// How ranked photos answer for some rays, and which of them speak: a ray a column.
 struct ChosenViews {
   std::span<const std::int32_t> pixel;  // the ray's pixel, its index in the picture; −1: not this one
-  std::size_t row_length = 0;           // ≥ pixel.size()
   int k = 0;
-  std::span<const float> weight;        // sums to 1 over the k, or is 0 in all: the point is in no photo's picture
-  std::span<const float> sight;         // of each ray alone, 0…1: how well the photo that shows it best shows it
-  std::span<const std::uint32_t> view;  // the rest is meaningless where the weight is 0
-  std::span<const float> x, y, lod;     // where the photo shows the point, photo pixels, and how finely: see RayAnswers
+  std::span<const float> weight;            // k rows: sum to 1, or all 0: the point is in no photo's picture
+  std::span<const std::int32_t> candidate;  // k rows: who has that weight; −1: nobody
+  std::span<const std::uint32_t> view;      // of each candidate
+  std::span<const float> x, y, lod;         // a row a candidate: see RayAnswers
+  std::span<const float> sight;             // a row a candidate: RayAnswers' weight
 };
 using TakeChosen = std::function<void(const ChosenViews&)>;
 
@@ -41,17 +42,10 @@ struct TileRays {
 
   [[nodiscard]] std::size_t size() const { return pixel.size(); }
   void resize(std::size_t);
+  // Repeats the last ray, for no pixel, until the rays from `first` on fill their lanes.
+  void fill_lanes(std::size_t first);
   void copy(std::size_t from, const TileRays& source, std::size_t to);
   [[nodiscard]] RayBundle bundle(std::size_t first, std::size_t count, const WantedResolution&) const;
-};
-
-struct CandidateView {
-  float least = 0;  // no ray of the region gives the photo a smaller penalty
-  std::uint32_t view = 0;
-};
-struct CandidateViews {
-  std::vector<CandidateView> views;  // rising by `least`, so that ranking can stop
-  float bound = 0;                   // no photo that is missing has a smaller penalty at any ray of the region
 };
 
 // One frame of a lumigraph: what all its tiles share.
@@ -61,21 +55,26 @@ struct TileFrame {
   const LumigraphOptions& options;
   float depth_tolerance = 0;             // see VisibilityOptions
   std::span<const AnsweringView> views;  // every photo, for this frame's eye
-  const CandidateViews& speaking;        // those that may speak, bounds 0 and infinite
+  const ViewTable& speaking;             // those of them that may speak
   WantedResolution wanted{};
 };
 
 // The memory that a thread renders tiles with. It is worth keeping from frame to frame.
 struct TileBuffers {
-  TileRays rays;                                  // of the tile, block by block
-  TileRays some;                                  // samples of a region, or rays that are ranked again
-  std::vector<float> x, y, lod, weight, penalty;  // answers, a row a candidate
+  TileRays rays;                                  // of the tile, bundle by bundle
+  TileRays some;                                  // of a bundle to be, samples of the tile, or rays to rank again
+  ViewTable near;                                 // the photos up to the tile's bound
+  std::vector<float> least;                       // of a table's photos
+  std::vector<float> of_part;                     // the same, for a part of the tile
+  std::vector<std::uint32_t> heap;                // rows of the table, the least first
+  std::vector<std::uint32_t> likely;              // photos that were among the best of the rays before
+  std::vector<std::uint32_t> view;                // the photos that were ranked
+  std::vector<std::uint8_t> is_best;              // each of those: among the best of a ray
+  std::vector<float> x, y, lod, weight, penalty;  // their answers, a row each
   std::vector<float> least_penalty;               // see LeastPenalties
   std::vector<std::int32_t> least_candidate;
-  CandidateViews of_tile, of_block, again;
-  std::vector<std::int32_t> pixel;  // see ChosenViews, as the rest
-  std::vector<float> chosen_weight, chosen_sight, chosen_x, chosen_y, chosen_lod;
-  std::vector<std::uint32_t> chosen_view;
+  std::vector<std::int32_t> pixel;  // see ChosenViews
+  std::vector<float> chosen_weight;
 };
 
 class TilePool {
@@ -89,10 +88,10 @@ class TilePool {
 
 // Chooses the photos for the pixels of a tile.
 //
-// For the tile, and then for each block of it, photos are put in the order of the least penalty that any of its rays
-// can give them; rays are ranked in that order until no photo that is left can be among any ray's k + 1 best. Blocks
-// look only at photos up to the tile's bound, which some rays of it guess; a ray whose (k + 1)-th best is above the
-// bound is ranked again, up to that. So every ray gets what ranking all photos would have given it.
+// For the tile, and then for each bundle of 8 × 8 rays, it is told of all photos at once what penalty no ray undercuts
+// (view_bounds.h); ranked are those that could yet be among the k + 1 best of a ray. Bundles look only at photos up to
+// a bound, which some rays of the tile guess; a ray whose (k + 1)-th best is above the bound is ranked again, among all
+// photos. So every ray gets what ranking all photos would have given it.
 class TileRenderer {
  public:
   TileRenderer(const TileFrame&, TileBuffers&, const TakeChosen&);
@@ -101,26 +100,40 @@ class TileRenderer {
   void render(int x0, int y0);
 
  private:
-  struct Region {  // rays [first, end)
+  struct Bundle {  // rays [first, end), full lanes of them
     std::size_t first = 0;
     std::size_t end = 0;
+    RaysBox box;
   };
 
   void shoot(int x0, int y0);
-  void shoot_block(int x0, int y0, int x1, int y1);
-  // The candidates that the rays can give a penalty up to `below`, in order. `from` must be of a region around them.
-  void bound_from_below(const TileRays&, const Region&, const CandidateViews& from, float below, CandidateViews& to);
-  void rank_for_tile();
-  void choose(const TileRays&, const Region&, const CandidateViews&);
-  void choose_again(float bound);
-  void rank(const RayBundle&, const CandidateViews&);
-  void hand_on(std::size_t rays, const CandidateViews&);
+  void shoot_bundle(int x0, int y0, int x1, int y1);
+  void add_bundle(std::size_t first);
+  void bound_for_tile();
+  void choose_for_tile();
+  void choose(const Bundle&);
+  void choose_again();
+  void hand_on();
+
+  // A ranking of photos for some rays: in `buffers_` and what follows here.
+  void start_ranking(const RayBundle&);
+  // `least`: no ray gives the photo a smaller penalty.
+  void rank(std::uint32_t view, float least);
+  void rank_all(const RayBundle&, const RaysBox&, const ViewTable&, float bound);
+  void keep_best();
+  [[nodiscard]] bool is_likely(std::uint32_t view) const;
+  RayBundle bundle_;
+  LeastPenalties ranking_;
+  PenaltyRange worst_;  // of each ray's (k + 1)-th best
 
   const TileFrame& frame_;
   TileBuffers& buffers_;
   const TakeChosen& take_;
   bool plain_camera_;
-  std::vector<Region> blocks_;  // of the tile's rays
+  Rigid3 world_from_cam_;
+  Eigen::Matrix3f axes_;  // its rotation
+  float bound_ = 0;       // of the tile: its near photos are those up to that
+  std::vector<Bundle> bundles_;
 };
 
 }  // namespace mf

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/atomic_file.h"
 #include "common/check.h"
 #include "common/error.h"
 #include "common/json_file.h"

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <deque>
+#include <vector>
 
 #include "common/check.h"
 
@@ -76,10 +77,18 @@ std::size_t Team::size() const {
 }
 
 void Team::share(std::span<std::byte> bytes, std::size_t from) const {
+  const Share one{bytes, from};
+  share({&one, 1});
+}
+
+void Team::share(std::span<const Share> shares) const {
   if (!link_) return;
-  for (std::size_t begin = 0; begin < bytes.size(); begin += largest_share)
-    must(MPI_Bcast(bytes.data() + begin, static_cast<int>(std::min(largest_share, bytes.size() - begin)), MPI_BYTE,
-                   static_cast<int>(from), MPI_COMM_WORLD));
+  std::vector<MPI_Request> requests;
+  for (const Share& share : shares)
+    for (std::size_t begin = 0; begin < share.bytes.size(); begin += largest_share)
+      must(MPI_Ibcast(share.bytes.data() + begin, static_cast<int>(std::min(largest_share, share.bytes.size() - begin)),
+                      MPI_BYTE, static_cast<int>(share.from), MPI_COMM_WORLD, &requests.emplace_back()));
+  must(MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE));
 }
 
 void Team::send(std::string message) {

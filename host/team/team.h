@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 namespace mf {
 
@@ -27,6 +28,12 @@ class Team {
   [[nodiscard]] bool has(std::size_t task) const { return task % size() == rank(); }
 
   // What `from` has in `bytes` everyone has afterwards. All give as many.
+  struct Share {
+    std::span<std::byte> bytes;
+    std::size_t from = 0;
+  };
+  // Many at once: the ranks wait for each other at the end only.
+  void share(std::span<const Share>) const;
   void share(std::span<std::byte> bytes, std::size_t from) const;
 
   // From any rank to rank 0, which receives from each in the order sent. send() returns at once, unless much is under
@@ -42,9 +49,10 @@ class Team {
 // Rows of a picture that were made in turn, row y by rank y mod size: afterwards everyone has all.
 template <typename Image>
 void share_rows(const Team& team, Image& image) {
-  if (team.size() == 1) return;
+  std::vector<Team::Share> rows;
   for (int y = 0; y < image.height; ++y)
-    team.share(std::as_writable_bytes(image.row(y)), static_cast<std::size_t>(y) % team.size());
+    rows.push_back({std::as_writable_bytes(image.row(y)), static_cast<std::size_t>(y) % team.size()});
+  team.share(rows);
 }
 
 }  // namespace mf

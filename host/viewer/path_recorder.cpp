@@ -9,12 +9,12 @@
 
 #include <csignal>
 
+#include "common/atomic_file.h"
 #include "common/check.h"
 #include "common/error.h"
 #include "common/json_file.h"
 #include "host/io/image_file.h"
 #include "host/lumigraph/camera_path.h"
-#include "host/lumigraph/picture_file.h"
 
 namespace mf {
 

@@ -157,10 +157,10 @@ void hallway_by_pixels(benchmark::State& state) {
   static std::map<std::int64_t, ImageU8> first;
   first[state.range(0)] = std::get<ImageU8>(pictures.front());
   first[-1] = std::get<ImageU8>(hallway().truth.front());
-  if (first.size() < 3) return;
+  if (first.size() < 4) return;
   ImageU8 row(Hallway::size_px * 3, Hallway::size_px, 3);
   int column = 0;
-  for (const std::int64_t key : {std::int64_t{0}, std::int64_t{100}, std::int64_t{-1}}) {
+  for (const std::int64_t key : {std::int64_t{0}, std::int64_t{200}, std::int64_t{-1}}) {
     for (int y = 0; y < Hallway::size_px; ++y) {
       const auto from = first[key].row(y);
       std::copy(from.begin(), from.end(), row.row(y).begin() + column * static_cast<std::ptrdiff_t>(from.size()));
@@ -173,6 +173,7 @@ BENCHMARK(hallway_by_pixels)
     ->ArgName("1000beta")
     ->Arg(0)
     ->Arg(100)
+    ->Arg(200)
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime()
     ->UseRealTime()
@@ -180,7 +181,7 @@ BENCHMARK(hallway_by_pixels)
 
 #if MF_HAVE_OPENCV
 void hallway_by_vertices(benchmark::State& state) {
-  const LumigraphOptions options = with_resolution(100);
+  const LumigraphOptions options = with_resolution(state.range(1));
   measure(state, [&](const View& view) {
     const Hallway& hall = hallway();
     return bench::render_by_vertices(
@@ -189,64 +190,59 @@ void hallway_by_vertices(benchmark::State& state) {
   });
 }
 BENCHMARK(hallway_by_vertices)
-    ->ArgName("grid_px")
-    ->Arg(8)
-    ->Arg(16)
-    ->Arg(32)
+    ->ArgNames({"grid_px", "1000beta"})
+    ->ArgsProduct({{8, 16, 32}, {100, 200}})
     ->Unit(benchmark::kMillisecond)
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Iterations(4);
 #endif
 
-struct Cube {
-  PhotoSet set;
-  std::unique_ptr<const Lumigraph> lumigraph;
-};
-const Cube* cube() {
-  static const std::unique_ptr<const Cube> cube = [] {
-    const fs::path folder = fs::path(MF_SHARED_DATA) / "cube";
-    if (!fs::exists(folder)) return std::unique_ptr<Cube>();
-    auto made = std::make_unique<Cube>(Cube{scaled(read_colmap(folder), 0.5), nullptr});
-    made->lumigraph = std::make_unique<const Lumigraph>(made->set, make_proxy("proxy.obj", made->set, folder));
-    return made;
-  }();
-  return cube.get();
-}
-
-// One of the options changed, the others at their defaults. Arguments: k, and 1000 β, 1000 γ, 1000 border.
+// One of the options changed, the others at their defaults. Arguments: k, 1000 β, 1000 γ, 1000 border, and silhouette.
 void left_out(benchmark::State& state) {
-  if (cube() == nullptr) {
+  const fs::path folder = fs::path(MF_SHARED_DATA) / "cube";
+  if (!fs::exists(folder)) {
     state.SkipWithError("the cube's photos are absent");
     return;
   }
+  static const PhotoSet cube = scaled(read_colmap(folder), 0.5);
+  VisibilityOptions visibility;
+  visibility.silhouette = static_cast<float>(state.range(4));
+  const Lumigraph lumigraph(cube, make_proxy("proxy.obj", cube, folder), visibility);
   LumigraphOptions options;
   options.penalty.k = static_cast<int>(state.range(0));
   options.penalty.resolution = static_cast<float>(state.range(1)) / 1000;
   options.penalty.border = static_cast<float>(state.range(2)) / 1000;
   options.border = static_cast<float>(state.range(3)) / 1000;
   for (auto _ : state) {
-    const LeaveOneOut result = leave_one_out(*cube()->lumigraph, cube()->set, options);
+    const LeaveOneOut result = leave_one_out(lumigraph, cube, options);
     state.counters["dB"] = result.psnr_db;
     state.counters["nearest_dB"] = result.nearest_view_psnr_db;
     state.counters["SSIM"] = result.ssim;
   }
 }
 BENCHMARK(left_out)
-    ->ArgNames({"k", "1000beta", "1000gamma", "1000border"})
-    ->Args({4, 100, 500, 30})
-    ->Args({1, 100, 500, 30})
-    ->Args({2, 100, 500, 30})
-    ->Args({3, 100, 500, 30})
-    ->Args({6, 100, 500, 30})
-    ->Args({12, 100, 500, 30})
-    ->Args({4, 0, 500, 30})
-    ->Args({4, 300, 500, 30})
-    ->Args({4, 1000, 500, 30})
-    ->Args({4, 100, 250, 30})
-    ->Args({4, 100, 1000, 30})
-    ->Args({4, 100, 500, 10})
-    ->Args({4, 100, 500, 100})
+    ->ArgNames({"k", "1000beta", "1000gamma", "1000border", "silhouette"})
+    ->Args({4, 200, 500, 30, 8})
+    ->Args({1, 200, 500, 30, 8})
+    ->Args({2, 200, 500, 30, 8})
+    ->Args({3, 200, 500, 30, 8})
+    ->Args({6, 200, 500, 30, 8})
+    ->Args({8, 200, 500, 30, 8})
+    ->Args({4, 0, 500, 30, 8})
+    ->Args({4, 100, 500, 30, 8})
+    ->Args({4, 300, 500, 30, 8})
+    ->Args({4, 1000, 500, 30, 8})
+    ->Args({4, 200, 250, 30, 8})
+    ->Args({4, 200, 1000, 30, 8})
+    ->Args({4, 200, 2000, 30, 8})
+    ->Args({4, 200, 500, 10, 8})
+    ->Args({4, 200, 500, 60, 8})
+    ->Args({4, 200, 500, 100, 8})
+    ->Args({4, 200, 500, 30, 0})
+    ->Args({4, 200, 500, 30, 4})
+    ->Args({4, 200, 500, 30, 12})
+    ->Args({4, 200, 250, 10, 16})
     ->Iterations(1)
     ->Unit(benchmark::kSecond);
 

@@ -86,7 +86,13 @@ TEST(LeastPenalties, FindsTheLeastWhateverItLookedForBefore) {
     }
     std::vector<float> expected = penalties;
     std::sort(expected.begin(), expected.end());
-    const auto& found = search.find(bounds.data(), bounds.size(), 9, [&](std::size_t i) { return penalties[i]; });
+    std::vector<bool> announced(bounds.size(), false);
+    const auto penalty_of = [&](std::size_t i) {
+      EXPECT_TRUE(announced[i]);
+      return penalties[i];
+    };
+    const auto& found =
+        search.find(bounds.data(), bounds.size(), 9, penalty_of, [&](std::size_t i) { announced[i] = true; });
     ASSERT_EQ(found.size(), 9U);
     std::vector<float> values;
     for (const ViewPenalty& v : found) {

@@ -76,6 +76,15 @@ TEST(ChosenRectangle, APlaneThatNoViewLooksThroughIsRefused) {
   EXPECT_TRUE(contains(beside, "they cover -0.0")) << beside;
 }
 
+// Two mirrors so far apart that nothing between them is looked through: one of the two places may still be asked for.
+TEST(ChosenRectangle, AGivenOneNeedsNoCommonPlace) {
+  Calibration calibration = looking_down({-0.7, 0.7});
+  calibration.frames[0].cam_from_mirror.translation.y() -= 0.7;  // the camera's y is downwards
+  calibration.frames[1].cam_from_mirror.translation.y() += 0.7;
+  EXPECT_TRUE(contains(refusal(calibration, 2), "c.json: --height: no mirror view looks through"));
+  EXPECT_TRUE(is_taken(calibration, 2, {{2.3, -2.5, 2.5, -2.3}}));
+}
+
 TEST(ChosenRectangle, MoreThanIsSearchedIsNotCutOff) {
   const Calibration calibration = looking_down({-0.4, -0.3, -0.2, -0.1, 0, 0.1, 0.2, 0.3, 0.4});
   EXPECT_TRUE(is_taken(calibration, 0));

@@ -8,56 +8,79 @@
 #include <random>
 
 #include "host/blending/view_weights.h"
+#include "host/light_field/block_blend.h"
 #include "host/light_field/half_floats.h"
 
 namespace mf {
 namespace {
 
-// In the frame of the wanted direction, up to rays that go the other way.
+using Shown = std::array<std::uint16_t, quarter_halves>;
+
+// Up to rays that go the other way.
 TEST(PlaneBlend, PenaltiesAreAnglesOverWeights) {
-  Lanes3 p;
-  set_points({0.1F, 0.2F, 0}, {0.01F, 0, 0}, {0, -0.01F, 0}, p);
-  std::array<std::uint16_t, block_lanes> weights;
-  weights.fill(to_half(0.5F));
-  weights[9] = 0;
-  Lanes inverse;
+  Shown shown;
+  shown.fill(to_half(0.5F));
+  shown[3 * quarter_lanes + 9] = 0;
+  const Eigen::Vector3f first(0.1F, 0.2F, 0), step_x(0.01F, 0, 0), step_y(0, -0.01F, 0);
+  const Eigen::Vector3f direction = Eigen::Vector3f(0.1F, -0.2F, 0.9F).normalized();
   for (const Eigen::Vector3f& centre : {Eigen::Vector3f(0.1F, 0.19F, -0.7F), Eigen::Vector3f(0.6F, 0.4F, -0.7F),
                                         Eigen::Vector3f(3, 1, -0.01F), Eigen::Vector3f(-1, 1, 0.4F)}) {
-    inverse_penalties(p, centre, weights.data(), inverse);
+    QuarterRays rays;
+    look_from(centre, first, step_x, step_y, shown.data(), rays);
+    std::array<QuarterView, 1> view{{{&rays, shown.data(), 1}}};
+    Quarter inverse;
+    ASSERT_EQ(inverse_penalties(direction, 0, view, &inverse), 1U);
     EXPECT_EQ(inverse.v[9], 0);
-    for (const std::size_t i : {0U, 7U, 35U, 63U}) {
-      const Eigen::Vector3f ray = Eigen::Vector3f(p.x.v[i], p.y.v[i], p.z.v[i]) - centre;
-      const float angle = std::atan2(ray.head<2>().norm(), ray.z());
+    for (const std::size_t i : {0U, 7U, 10U, 15U}) {
+      const auto [x, y] = texel_of(0, i);
+      const Eigen::Vector3f ray = first + static_cast<float>(x) * step_x + static_cast<float>(y) * step_y - centre;
+      const float angle = std::atan2(ray.cross(direction).norm(), ray.dot(direction));
       EXPECT_NEAR(1 / inverse.v[i] - same_ray_rad, angle / 0.5F, 1e-4F + 1e-4F * angle);
-      const float chord = (ray.normalized() - Eigen::Vector3f::UnitZ()).norm();
+      const float chord = (ray.normalized() - direction).norm();
       EXPECT_NEAR(inverse_penalty(chord, 0.5F) / inverse.v[i], 1, 2e-3F);
     }
+    EXPECT_EQ(inverse_penalties(direction, 1e6F, view, &inverse), 0U) << "a bound that no view exceeds";
   }
 }
 
-// What is summed over a block's views is what the definition says of each ray, whatever the number of views.
+// All texels of a block, once each.
+TEST(PlaneBlend, QuartersTileABlock) {
+  std::array<int, block_lanes> covered{};
+  for (std::size_t q = 0; q < quarters; ++q)
+    for (std::size_t i = 0; i < quarter_lanes; ++i) {
+      const auto [x, y] = texel_of(q, i);
+      ++covered.at(static_cast<std::size_t>(y * block_side + x));
+    }
+  for (const int times : covered) EXPECT_EQ(times, 1);
+}
+
+float half_value(std::uint16_t half) {
+  return half_unshift * shifted_half(half);
+}
+
+// What is summed over a quarter's views is what the definition says of each ray, whatever the number of views.
 TEST(PlaneBlend, SumsAreBuehlers) {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<Lanes> sinking;
-  for (const std::size_t k : {1U, 4U, 15U, 64U})
+  for (const std::size_t k : {1U, 4U, 15U, 16U, 64U})
     for (const std::size_t count : {std::size_t{1}, std::size_t{3}, std::size_t{20}, std::size_t{80}}) {
-      std::vector<Lanes> inverses(count);
-      std::vector<std::array<std::uint16_t, 4 * block_lanes>> texels(count);
-      for (std::size_t c = 0; c < count; ++c)
-        for (std::size_t i = 0; i < block_lanes; ++i) {
+      std::vector<Quarter> inverses(count);
+      std::vector<Shown> shown(count);
+      std::vector<QuarterView> views;
+      for (std::size_t c = 0; c < count; ++c) {
+        for (std::size_t i = 0; i < quarter_lanes; ++i) {
           const bool sees = uniform(random) > 0.2F;
           inverses[c].v[i] = sees ? 1 / (uniform(random) * uniform(random) + same_ray_rad) : 0;
           for (std::size_t channel = 0; channel < 4; ++channel)
-            texels[c][channel * block_lanes + i] = sees ? to_half(0.1F + 0.9F * uniform(random)) : std::uint16_t{0};
+            shown[c][channel * quarter_lanes + i] = sees ? to_half(0.1F + 0.9F * uniform(random)) : std::uint16_t{0};
         }
-      Lanes threshold, confidence;
-      inverse_thresholds(inverses, k, 0, sinking, threshold);
-      ViewSums sums{};
-      for (std::size_t c = 0; c < count; ++c) add_view(inverses[c], threshold, texels[c].data(), 2, sums);
-      Lanes3 colour;
-      finish(sums, colour, confidence);
-      for (std::size_t i = 0; i < block_lanes; ++i) {
+        views.push_back({nullptr, shown[c].data(), 2});
+      }
+      Quarter threshold;
+      inverse_thresholds(inverses, k, 0, threshold);
+      BlendedQuarter blended;
+      blend(views, inverses.data(), threshold, blended);
+      for (std::size_t i = 0; i < quarter_lanes; ++i) {
         std::vector<ViewPenalty> candidates;
         for (std::uint32_t c = 0; c < count; ++c)
           if (inverses[c].v[i] > 0) candidates.push_back({c, 1 / inverses[c].v[i] - same_ray_rad});
@@ -65,42 +88,45 @@ TEST(PlaneBlend, SumsAreBuehlers) {
         const std::size_t speaking = blend_weights(candidates, static_cast<int>(k), same_ray_rad, expected);
         float green = 0, seen = 0;
         for (std::size_t s = 0; s < speaking; ++s) {
-          const auto& texel = texels[expected[s].view];
-          green += expected[s].weight * 2 * half_unshift * shifted_half(texel[block_lanes + i]);
-          seen += half_unshift * shifted_half(texel[3 * block_lanes + i]);
+          const Shown& texels = shown[expected[s].view];
+          green += expected[s].weight * 2 * half_value(texels[quarter_lanes + i]);
+          seen += half_value(texels[3 * quarter_lanes + i]);
         }
-        ASSERT_NEAR(colour.y.v[i], green, 2e-3F * green) << k << ' ' << count;
-        ASSERT_NEAR(confidence.v[i], std::min(seen, 1.0F), 1e-5F);
+        ASSERT_NEAR(blended.green.v[i], green, 2e-3F * green) << k << ' ' << count;
+        ASSERT_NEAR(blended.confidence.v[i], std::min(seen, 1.0F), 1e-5F);
       }
     }
 }
 
+std::vector<Quarter> all_texels(std::initializer_list<float> values) {
+  std::vector<Quarter> quarters;
+  for (const float value : values) quarters.push_back({Quarter::Vector{} + value});
+  return quarters;
+}
+
 // Views that tie with the threshold, as copies of one frame do, have seen the texel: it is no hole.
 TEST(PlaneBlend, TiesAreNoHoles) {
-  std::vector<Lanes> inverses(3), sinking;
-  for (Lanes& inverse : inverses) inverse.v.fill(2);
-  std::array<std::uint16_t, 4 * block_lanes> texels;
-  texels.fill(to_half(0.5F));
-  Lanes threshold, confidence;
-  inverse_thresholds(inverses, 2, 0, sinking, threshold);
-  ViewSums sums{};
-  for (const Lanes& inverse : inverses) add_view(inverse, threshold, texels.data(), 1, sums);
-  Lanes3 colour;
-  finish(sums, colour, confidence);
-  EXPECT_NEAR(colour.x.v[9], 0.5F, 1e-4F);
-  EXPECT_GT(confidence.v[9], 0);
+  const std::vector<Quarter> inverses = all_texels({2, 2, 2});
+  Shown shown;
+  shown.fill(to_half(0.5F));
+  const std::vector<QuarterView> views(3, {nullptr, shown.data(), 1});
+  Quarter threshold;
+  inverse_thresholds(inverses, 2, 0, threshold);
+  BlendedQuarter blended;
+  blend(views, inverses.data(), threshold, blended);
+  EXPECT_NEAR(blended.red.v[9], 0.5F, 1e-4F);
+  EXPECT_GT(blended.confidence.v[9], 0);
 }
 
 // Only views above a bound are given: where fewer than k + 1 are, the bound is the threshold.
 TEST(PlaneBlend, ThresholdIsNotBelowItsBound) {
-  std::vector<Lanes> inverses(3), sinking;
-  for (std::size_t c = 0; c < 3; ++c) inverses[c].v.fill(static_cast<float>(c + 1));
-  Lanes threshold;
-  inverse_thresholds(inverses, 2, 0.5F, sinking, threshold);
+  const std::vector<Quarter> inverses = all_texels({1, 2, 3});
+  Quarter threshold;
+  inverse_thresholds(inverses, 2, 0.5F, threshold);
   EXPECT_EQ(threshold.v[5], 1);
-  inverse_thresholds(inverses, 3, 0.5F, sinking, threshold);
+  inverse_thresholds(inverses, 3, 0.5F, threshold);
   EXPECT_EQ(threshold.v[5], 0.5F);
-  inverse_thresholds(inverses, 1, 2.5F, sinking, threshold);
+  inverse_thresholds(inverses, 1, 2.5F, threshold);
   EXPECT_EQ(threshold.v[5], 2.5F);
 }
 

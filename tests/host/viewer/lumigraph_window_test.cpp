@@ -178,6 +178,9 @@ TEST_F(LumigraphWindow, NamesWhatItCannotShow) {
     return outcome.err;
   };
   EXPECT_NE(error({}).find("needs one thing to show"), std::string::npos);
+  EXPECT_NE(
+      error({"--transforms", folder_ / "transforms.json", "--scene"}).find("--scene: is for a session's pictures"),
+      std::string::npos);
   EXPECT_NE(error({"--transforms", folder_ / "none.json"}).find("none.json"), std::string::npos);
   EXPECT_NE(error({"--transforms", folder_ / "transforms.json", "--proxy", "cone"}).find("cone"), std::string::npos);
   EXPECT_NE(error({"--transforms", folder_ / "transforms.json", "--scale", "2"}).find("--scale"), std::string::npos);
