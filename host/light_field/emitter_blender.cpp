@@ -14,9 +14,9 @@ namespace mf {
 
 namespace {
 
-constexpr int most_views = 4;           // that speak for a ray: the fewer, the sharper an occluder's edge
-constexpr float ghost_margin = 1.25F;   // times the radius: a view's ray this near to the ball shows some of its glare
-constexpr float ghost_reach_m = 0.12F;  // as far beside an emitter a blended view may still show it
+constexpr int most_views = 4;             // that speak for a ray: the fewer, the sharper an occluder's edge
+constexpr float ghost_margin = 1.25F;     // times the radius: what a view sees this near to the ball shows its glare
+constexpr float ghost_reach_m = 0.12F;    // as far beside an emitter a blended view may still show it
 constexpr float smallest_weight = 0.02F;  // a view that shows less than this of the ray does not speak for it
 constexpr float same_ray_m = 1e-3F;
 
@@ -93,10 +93,22 @@ bool EmitterBlender::may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& d
   });
 }
 
-const ShadedEmitter* EmitterBlender::met_by(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
-                                            float scale) const {
+bool EmitterBlender::shown_by(const FieldView& view, const ProxyPoint& x, float angle_rad) const {
+  if (emitters_.empty()) return false;
+  const Eigen::Vector3f ray = ray_to(x, view.centre_in_world);
+  const float length = ray.norm();
+  return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
+    const Eigen::Vector3f to = s.emitter.position - view.centre_in_world;
+    const float along = to.dot(ray) / length;
+    // Half of the footprint, and as much for the filter that fetched it.
+    const float reach = ghost_margin * s.emitter.radius_m + angle_rad / length * along;
+    return along > 0 && to.squaredNorm() - along * along < reach * reach;
+  });
+}
+
+const ShadedEmitter* EmitterBlender::met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
   for (const ShadedEmitter& s : emitters_)
-    if (s.met_at(origin, direction, scale)) return &s;
+    if (s.met_at(p, direction)) return &s;
   return nullptr;
 }
 
@@ -116,9 +128,7 @@ Eigen::Vector4f EmitterBlender::radiance(const ShadedEmitter* met, const Eigen::
   const ProxyPoint x = proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction));
   for (const std::uint32_t v : candidates) {
     const FieldView& view = views_[v];
-    if (met == nullptr &&
-        met_by(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ghost_margin) != nullptr)
-      continue;
+    if (met == nullptr && shown_by(view, x, angle_rad)) continue;
     const Eigen::Vector3f pixel = pixel_of(view, x);
     if (pixel.z() <= 0) continue;
     const Eigen::Vector4f seen =

@@ -6,6 +6,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 
 #include "host/light_field/block_blend.h"
 #include "host/light_field/emitter_blender.h"
@@ -13,6 +15,18 @@
 namespace mf {
 
 namespace {
+
+// What a ray from the plane's point p (world) receives of the emitter that it meets, through its mask; nothing for rays
+// that meet none, and emitters without a mask.
+std::optional<Eigen::Vector3f> emitted_radiance(std::span<const ShadedEmitter> emitters, const Eigen::Vector3f& p,
+                                                const Eigen::Vector3f& direction) {
+  for (const ShadedEmitter& e : emitters) {
+    if (!e.met_at(p, direction)) continue;
+    const auto visible = e.visibility(p, direction);
+    return visible ? std::optional<Eigen::Vector3f>(*visible * e.radiance) : std::nullopt;
+  }
+  return std::nullopt;
+}
 
 // The emitters' light in one cell, mean over it, at the vertices of the resampler's blocks; empty where it has none.
 class DrawnLight {
@@ -99,16 +113,6 @@ class DrawnLight {
 };
 
 }  // namespace
-
-std::optional<Eigen::Vector3f> emitted_radiance(std::span<const ShadedEmitter> emitters, const Eigen::Vector3f& p,
-                                                const Eigen::Vector3f& direction) {
-  for (const ShadedEmitter& e : emitters) {
-    if (!e.met_at(p, direction)) continue;
-    const auto visible = e.visibility(p, direction);
-    return visible ? std::optional<Eigen::Vector3f>(*visible * e.radiance) : std::nullopt;
-  }
-  return std::nullopt;
-}
 
 DarkTiles tiles_without_emitters(const LightField& field) {
   DarkTiles tiles;

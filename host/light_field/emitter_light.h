@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
-#include <optional>
-#include <span>
 #include <vector>
 
 #include "host/light_field/light_field.h"
 #include "host/light_field/light_tiles.h"
 
 namespace mf {
-
-// What a ray from the plane's point p (world) receives of the emitter that it meets, through its mask; nothing for rays
-// that meet none, and emitters without a mask.
-[[nodiscard]] std::optional<Eigen::Vector3f> emitted_radiance(std::span<const ShadedEmitter>, const Eigen::Vector3f& p,
-                                                              const Eigen::Vector3f& direction);
 
 // A field's tiles without the light that its emitters bring through their masks. `images` has one for each direction
 // and refers to the field's texels, where an emitter shows to `changed`; both must outlive it.
