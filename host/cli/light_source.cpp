@@ -17,10 +17,9 @@ using Clock = std::chrono::steady_clock;
 
 // Without --directions a picture is as good as with the whole light field; else it is a preview.
 JustInTimeOptions quality(const LightField& field, const LightOptions& options) {
-  constexpr int preview_texels = 8, preview_texels_over_the_plane = 16;
+  constexpr int preview_texels = 16;
   constexpr int block = 8;
-  if (options.directions == 0) return {(field.resolution + block - 1) / block * block};
-  return {options.plane ? preview_texels_over_the_plane : preview_texels};
+  return {options.directions == 0 ? (field.resolution + block - 1) / block * block : preview_texels};
 }
 
 // What each cell brings where the surroundings have no panorama: every cell has to be asked, roughly.
