@@ -83,7 +83,7 @@ void write_sweep(const fs::path& folder, const Rig& rig) {
   write_json_file(folder / "sweep.json", index);
 }
 
-// Mean over the pixels whose centres lie within a disc.
+// Mean over the pixels that a disc touches.
 Rgb disc_mean(const ImageF& picture, const Eigen::Vector2d& centre, double radius) {
   Rgb sum = Rgb::Zero();
   int count = 0;
@@ -91,7 +91,8 @@ Rgb disc_mean(const ImageF& picture, const Eigen::Vector2d& centre, double radiu
        y <= std::min(picture.height - 1, static_cast<int>(centre.y() + radius)); ++y)
     for (int x = std::max(0, static_cast<int>(centre.x() - radius));
          x <= std::min(picture.width - 1, static_cast<int>(centre.x() + radius)); ++x)
-      if ((Eigen::Vector2d(x + 0.5, y + 0.5) - centre).norm() <= radius) {
+      if (std::hypot(std::clamp(centre.x(), x + 0., x + 1.) - centre.x(),
+                     std::clamp(centre.y(), y + 0., y + 1.) - centre.y()) < radius) {
         sum += Rgb(picture.at(x, y, 0), picture.at(x, y, 1), picture.at(x, y, 2));
         ++count;
       }

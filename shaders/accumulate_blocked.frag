@@ -8,10 +8,11 @@ void main() {
   Point point = fetch_point();
   vec3 sum = vec3(0.0);
   for (int i = 0; i < count.x; ++i) {
-    float cosine = dot(point.normal, lights[i].direction.xyz);
+    vec3 w = direction_to(i, point);
+    float cosine = dot(point.normal, w);
     if (cosine <= 0.0) continue;
-    float blocked = 1.0 - visibility(i, point);
-    if (blocked > 0.0) sum += cosine * lights[i].direction.w * blocked * radiance(i, point);
+    float blocked = 1.0 - visibility(i, point, w);
+    if (blocked > 0.0) sum += cosine * solid_angle(i, point, w) * blocked * radiance(i, point, w);
   }
   irradiance = vec4(sum, 0.0);
 }

@@ -8,10 +8,10 @@ void main() {
   Point point = fetch_point();
   vec3 sum = vec3(0.0);
   for (int i = 0; i < count.x; ++i) {
-    vec3 w = lights[i].direction.xyz;
+    vec3 w = direction_to(i, point);
     float cosine = dot(point.normal, w);
     if (cosine > 0.0 && dot(point.geometric_normal, w) > 0.0)
-      sum += cosine * lights[i].direction.w * visibility(i, point) * radiance(i, point);
+      sum += cosine * solid_angle(i, point, w) * visibility(i, point, w) * radiance(i, point, w);
   }
   irradiance = vec4(sum, 0.0);
 }

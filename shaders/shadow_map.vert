@@ -8,9 +8,9 @@ layout(location = 0) in vec3 x_in_plane;
 // One instance a light, one layer an instance.
 void main() {
   Light light = lights[gl_InstanceID];
-  vec3 map = vec3(dot(light.shadow_u.xyz, x_in_plane) + light.shadow_u.w,
-                  dot(light.shadow_v.xyz, x_in_plane) + light.shadow_v.w,
-                  dot(light.shadow_depth.xyz, x_in_plane) + light.shadow_depth.w);
-  gl_Position = vec4(2.0 * map - 1.0, 1.0);
+  vec4 x = vec4(x_in_plane, 1.0);
+  vec3 map = vec3(dot(light.shadow_u, x), dot(light.shadow_v, x), dot(light.shadow_depth, x));
+  float w = dot(light.shadow_w, x);
+  gl_Position = vec4(2.0 * map - w, w);
   gl_Layer = gl_InstanceID;
 }

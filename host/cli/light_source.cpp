@@ -17,10 +17,9 @@ using Clock = std::chrono::steady_clock;
 
 // Without --directions a picture is as good as with the whole light field; else it is a preview.
 JustInTimeOptions quality(const LightField& field, const LightOptions& options) {
-  constexpr int preview_texels = 8, preview_texels_over_the_plane = 16;
+  constexpr int preview_texels = 16;
   constexpr int block = 8;
-  if (options.directions == 0) return {(field.resolution + block - 1) / block * block};
-  return {options.plane ? preview_texels_over_the_plane : preview_texels};
+  return {options.directions == 0 ? (field.resolution + block - 1) / block * block : preview_texels};
 }
 
 // What each cell brings where the surroundings have no panorama: every cell has to be asked, roughly.
@@ -47,7 +46,7 @@ IncidentLight light_of(const Capture& capture, const Bounds& object, const Light
   start = Clock::now();
   std::vector<PlaneTile> tiles =
       resample_just_in_time(capture.views, field, capture.penalty, plan.requests, quality(field, options));
-  IncidentLight light = incident_light(field.directions, field.plane, plan, std::move(tiles), options);
+  IncidentLight light = incident_light(field, object, plan, std::move(tiles), options);
   seconds["resampling"] = seconds_since(start);
   return light;
 }

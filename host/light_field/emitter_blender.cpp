@@ -14,9 +14,9 @@ namespace mf {
 
 namespace {
 
-constexpr int most_views = 4;           // that speak for a ray: the fewer, the sharper an occluder's edge
-constexpr float ghost_margin = 1.25F;   // times the radius: a view's ray this near to the ball shows some of its glare
-constexpr float ghost_reach_m = 0.12F;  // as far beside an emitter a blended view may still show it
+constexpr int most_views = 4;             // that speak for a ray: the fewer, the sharper an occluder's edge
+constexpr float ghost_margin = 1.25F;     // times the radius: what a view sees this near to the ball shows its glare
+constexpr float ghost_reach_m = 0.12F;    // as far beside an emitter a blended view may still show it
 constexpr float smallest_weight = 0.02F;  // a view that shows less than this of the ray does not speak for it
 constexpr float same_ray_m = 1e-3F;
 
@@ -24,25 +24,6 @@ struct Answer {
   float penalty = 0;
   Eigen::Vector4f seen;  // premultiplied
 };
-
-// What the views say of a ray that meets the emitter, when focused on the occluder; only views that look at the emitter
-// through that point.
-void ask_about_emitter(const std::vector<FieldView>& views, std::span<const std::uint32_t> candidates,
-                       const ShadedEmitter& e, const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
-                       float angle_rad, std::vector<Answer>& answers) {
-  const float along = (e.emitter.position - p).dot(direction);
-  const ProxyPoint x = proxy_point(p, direction, 1 / (e.share_along(p, direction) * along));
-  for (const std::uint32_t v : candidates) {
-    const FieldView& view = views[v];
-    if (!e.met_at(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ShadedEmitter::well_inside))
-      continue;
-    const Eigen::Vector3f pixel = pixel_of(view, x);
-    if (pixel.z() <= 0) continue;
-    const Eigen::Vector4f seen =
-        view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-    if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
-  }
-}
 
 float log_luminance(const Eigen::Vector4f& seen) {
   return std::log2(std::max(shown_luminance(seen), 1e-3F));
@@ -112,10 +93,22 @@ bool EmitterBlender::may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& d
   });
 }
 
-const ShadedEmitter* EmitterBlender::met_by(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
-                                            float scale) const {
+bool EmitterBlender::shown_by(const FieldView& view, const ProxyPoint& x, float angle_rad) const {
+  if (emitters_.empty()) return false;
+  const Eigen::Vector3f ray = ray_to(x, view.centre_in_world);
+  const float length = ray.norm();
+  return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
+    const Eigen::Vector3f to = s.emitter.position - view.centre_in_world;
+    const float along = to.dot(ray) / length;
+    // Half of the footprint, and as much for the filter that fetched it.
+    const float reach = ghost_margin * s.emitter.radius_m + angle_rad / length * along;
+    return along > 0 && to.squaredNorm() - along * along < reach * reach;
+  });
+}
+
+const ShadedEmitter* EmitterBlender::met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
   for (const ShadedEmitter& s : emitters_)
-    if (s.met_at(origin, direction, scale)) return &s;
+    if (s.met_at(p, direction)) return &s;
   return nullptr;
 }
 
@@ -124,28 +117,23 @@ Eigen::Vector4f EmitterBlender::radiance(const ShadedEmitter* met, const Eigen::
                                          std::span<const std::uint32_t> candidates) const {
   thread_local std::vector<Answer> answers;  // called for every part of many cells: no allocation each time
   answers.clear();
-  if (met != nullptr && lit_ == Lit::no) return {0, 0, 0, 1};
   if (met != nullptr) {
     const auto visible = met->visibility(p, direction);
+    if (visible && lit_ == Lit::no) return {0, 0, 0, 1};
     if (visible) {
       const Eigen::Vector3f colour = *visible * met->radiance;
       return {colour.x(), colour.y(), colour.z(), 1};
     }
-    ask_about_emitter(views_, candidates, *met, p, direction, angle_rad, answers);
   }
-  if (answers.empty()) {
-    const ProxyPoint x = proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction));
-    for (const std::uint32_t v : candidates) {
-      const FieldView& view = views_[v];
-      if (met == nullptr &&
-          met_by(view.centre_in_world, ray_to(x, view.centre_in_world).normalized(), ghost_margin) != nullptr)
-        continue;
-      const Eigen::Vector3f pixel = pixel_of(view, x);
-      if (pixel.z() <= 0) continue;
-      const Eigen::Vector4f seen =
-          view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-      if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
-    }
+  const ProxyPoint x = proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction));
+  for (const std::uint32_t v : candidates) {
+    const FieldView& view = views_[v];
+    if (met == nullptr && shown_by(view, x, angle_rad)) continue;
+    const Eigen::Vector3f pixel = pixel_of(view, x);
+    if (pixel.z() <= 0) continue;
+    const Eigen::Vector4f seen =
+        view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
+    if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
   }
   std::array<ViewWeight, most_views> weights;
   thread_local std::vector<ViewPenalty> ranked;

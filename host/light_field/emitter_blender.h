@@ -9,6 +9,7 @@
 #include "host/light_field/emitters.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/view_rays.h"
 #include "host/team/team.h"
 
 namespace mf {
@@ -23,8 +24,8 @@ namespace mf {
 // distances: no single focus is right. But a ray either meets the lamp's ball or not, and that is known:
 //  - a ray that meets it is focused on the occluder: of all views' rays through that point of the occluder, those that
 //    meet the ball too say whether it is hidden there (the lamp itself looks the same from everywhere). Together they
-//    draw the occluder's mask;
-//  - a ray that misses it is focused on the surroundings, and views whose own ray meets the ball have no say.
+//    draw the occluder's mask, which answers;
+//  - a ray that misses it is focused on the surroundings, and views that show the ball there have no say.
 // So the lamp's outline is sharp where geometry puts it, its shadows' edges are where the occluder puts them, and no
 // ghost of the lamp beside it adds energy.
 class EmitterBlender {
@@ -47,10 +48,12 @@ class EmitterBlender {
   // Whether rays within `angle_rad` of the direction may meet one.
   [[nodiscard]] bool may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
 
+  // Whether what a view shows of the proxy point, over `angle_rad` as seen from the plane, has an emitter or its glare
+  // in it. For a ray that meets none such a view says nothing.
+  [[nodiscard]] bool shown_by(const FieldView&, const ProxyPoint&, float angle_rad) const;
+
   // The emitter that a ray meets, hidden or not; null when it meets none.
-  [[nodiscard]] const ShadedEmitter* met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
-    return met_by(p, direction, 1);
-  }
+  [[nodiscard]] const ShadedEmitter* met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
 
   // Blended colour and weight of one ray with a footprint of `angle_rad`. `met`: the emitter it meets. Only
   // `candidates` are asked (indices of views).
@@ -61,9 +64,6 @@ class EmitterBlender {
   [[nodiscard]] const std::vector<ShadedEmitter>& emitters() const { return emitters_; }
 
  private:
-  [[nodiscard]] const ShadedEmitter* met_by(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
-                                            float scale) const;
-
   const std::vector<FieldView>& views_;
   const Surroundings& surroundings_;
   std::vector<ShadedEmitter> emitters_;

@@ -12,15 +12,14 @@ namespace mf {
 
 struct JustInTimeOptions {
   // A tile is as fine as the light field's, but has no more than this many texels along a side (more only where they
-  // would be larger than 5 cm). What comes from far off varies slowly over the plane, and small bright sources are
-  // drawn apart, always as finely as the light field has them: so a preview needs few. A multiple of 8, at least 8.
+  // would be larger than 5 cm). What comes from far off varies slowly over the plane, and small bright sources are left
+  // out: so a preview needs few. A multiple of 8, at least 8.
   int most_texels = 8;
 };
 
 // The light of some cells over some parts of the plane, straight from the views: what merged_tiles makes of the whole
-// light field, without the rest of it (Ihrke et al. 2008, future work). `focused` is a light field without texels
-// (Resampling::field), whose resolution says how finely emitters are drawn. What no view saw is guessed
-// (hole_filler.h).
+// light field's tiles_without_emitters, without the rest of it (Ihrke et al. 2008, future work). `focused` is a light
+// field without texels (Resampling::field). What no view saw is guessed (hole_filler.h).
 //
 // The tiles reach at least over the requests' rectangles, and no farther than the light field's, which a request
 // beyond it is moved to: there the rim's value holds on. With the plane as proxy they are over all of it: few texels

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 
+#include "common/check.h"
+
 namespace mf {
 
 std::vector<PlaneImage> images_of(const LightField& field) {
@@ -15,18 +17,21 @@ std::vector<PlaneImage> images_of(const LightField& field) {
   return images;
 }
 
-std::vector<PlaneTile> merged_tiles(const LightField& field, std::span<const TileRequest> requests) {
+std::vector<PlaneTile> merged_tiles(const DirectionSet& directions, std::span<const PlaneImage> images,
+                                    std::span<const TileRequest> requests) {
+  check(images.size() == directions.size() && !images.empty(), "an image for each direction");
+  const PlaneImage& first = images.front();
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(), [&](std::size_t r) {
     PlaneTile& tile = tiles[r];
-    tile = {field.plane.min_m.cast<float>(), field.plane.max_m.cast<float>(), field.resolution, field.resolution, {}};
-    tile.texels.assign(field.texel_count(), Eigen::Vector4f::Zero());
+    tile = {first.min_m, first.max_m, first.width, first.height, {}};
+    tile.texels.assign(first.texel_count(), Eigen::Vector4f::Zero());
     float solid_angle = 0;
-    for (const std::uint32_t cell : requests[r].cells) solid_angle += field.directions.solid_angles_sr[cell];
+    for (const std::uint32_t cell : requests[r].cells) solid_angle += directions.solid_angles_sr[cell];
     for (const std::uint32_t cell : requests[r].cells) {
-      const float share = field.directions.solid_angles_sr[cell] / solid_angle;
-      const Eigen::Vector4f* of_cell = field.tile(cell);
-      for (std::size_t t = 0; t < field.texel_count(); ++t) tile.texels[t] += share * of_cell[t];
+      const float share = directions.solid_angles_sr[cell] / solid_angle;
+      const Eigen::Vector4f* of_cell = images[cell].texels;
+      for (std::size_t t = 0; t < tile.texels.size(); ++t) tile.texels[t] += share * of_cell[t];
     }
   });
   return tiles;

@@ -58,6 +58,8 @@ struct TileRequest {
 };
 
 // For each request the mean radiance over its cells, weighted by their solid angles, over the whole rectangle.
-[[nodiscard]] std::vector<PlaneTile> merged_tiles(const LightField&, std::span<const TileRequest>);
+// Precondition: an image for each direction, all of one rectangle and size.
+[[nodiscard]] std::vector<PlaneTile> merged_tiles(const DirectionSet&, std::span<const PlaneImage>,
+                                                  std::span<const TileRequest>);
 
 }  // namespace mf

@@ -157,6 +157,32 @@ ImageF sweep_distances(const Witnesses& witnesses, const Team& team, ShadedEmitt
   return best;
 }
 
+// Where no view looked, what the nearest texels that are known say, ring by ring.
+void guess_the_rest(ImageF& mask) {
+  constexpr float of_a_guess = 1e-4F;  // below any weight that a view gives: beside what is known, a guess says nothing
+  std::vector<std::array<int, 2>> unknown;
+  for (int y = 0; y < mask.height; ++y)
+    for (int x = 0; x < mask.width; ++x)
+      if (mask.at(x, y, 1) <= 0) unknown.push_back({x, y});
+  while (!unknown.empty() && unknown.size() < static_cast<std::size_t>(mask.width * mask.height)) {
+    const ImageF before = mask;
+    std::erase_if(unknown, [&](const std::array<int, 2>& at) {
+      float sum = 0, known = 0;
+      for (int i = 0; i < 9; ++i) {
+        const int x = std::clamp(at[0] + i % 3 - 1, 0, mask.width - 1);
+        const int y = std::clamp(at[1] + i / 3 - 1, 0, mask.height - 1);
+        if (before.at(x, y, 1) <= 0) continue;
+        sum += before.at(x, y, 0);
+        ++known;
+      }
+      if (known == 0) return false;
+      mask.at(at[0], at[1], 0) = sum / known;
+      mask.at(at[0], at[1], 1) = of_a_guess;
+      return true;
+    });
+  }
+}
+
 }  // namespace
 
 void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& rectangle, const Team& team,
@@ -183,6 +209,7 @@ void draw_occluders(const std::vector<FieldView>& views, const PlaneRectangle& r
     }
   });
   share_rows(team, e.mask);
+  guess_the_rest(e.mask);
 }
 
 }  // namespace mf

@@ -32,15 +32,16 @@ struct ShadedEmitter {
   float plane_height_m = 0;                            // h: world z of the plane
   Eigen::Vector2f mask_min_m = Eigen::Vector2f::Zero();
   Eigen::Vector2f mask_max_m = Eigen::Vector2f::Zero();
-  // Three channels: the part of the light that passes (0…1), its weight (0: no view looked there), the share. Row 0 at
-  // max y.
+  // Three channels: the part of the light that passes (0…1), its weight (up to 1e-4: no view looked there, a guess), the
+  // share. Row 0 at max y.
   ImageF mask;
 
   // Distance from the origin to the ray's point nearest to the centre; nothing when it passes outside `scale` radii.
   [[nodiscard]] std::optional<float> met_at(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                                             float scale = 1) const;
 
-  // Share of the emitter's light that a ray from the plane's point p (world) receives; nothing where no view looked.
+  // Share of the emitter's light that a ray from the plane's point p (world) receives; nothing without a mask, or when
+  // no view looked at the emitter at all.
   // Precondition: the ray meets the emitter.
   [[nodiscard]] std::optional<float> visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
 

@@ -128,6 +128,9 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     if (look.level == Look::nowhere) return INFINITY;
     const float weight = view.fetch(look.level, look.u, look.v).w();
     if (weight < smallest_view_weight) return INFINITY;
+    // A lamp that is nearer than the proxy, or farther, shows elsewhere too, in views that pass by. Cells near it have
+    // spare views instead: which of their parts a view may speak for is asked later.
+    if (cell_.fine_parts.empty() && emitters_.shown_by(view, v.focus, cell_.angle_rad)) return INFINITY;
     const float penalty = penalty_of(penalty_, {std::sqrt(bounds_[i]), coarseness_of(view, v.focus), weight});
     return penalty * penalty;
   };
@@ -168,7 +171,10 @@ const Eigen::Vector4f& TileResampler::seen_at(std::size_t looker, int x, int y) 
       seen_[(looker * patch_side + static_cast<std::size_t>(y) % patch_side) * static_cast<std::size_t>(vertices_) +
             static_cast<std::size_t>(x)];
   if (seen.stamp != stamp) {
-    seen.colour = cell_of(looker).seen(views_[lookers_.views[looker]], vertex(x, y).focus);
+    const FieldView& view = views_[lookers_.views[looker]];
+    seen.colour = emitters_.shown_by(view, vertex(x, y).focus, cell_.angle_rad)
+                      ? Eigen::Vector4f(Eigen::Vector4f::Zero())
+                      : cell_of(looker).seen(view, vertex(x, y).focus);
     seen.stamp = stamp;
   }
   return seen.colour;
@@ -320,6 +326,10 @@ void TileResampler::blend_texels(const Rays& rays, Lanes3& colour, Lanes& confid
     }
     if (any == 0) return;
     const FieldView& view = views_[candidate_views_[c]];
+    for (std::size_t i = 0; i < block_lanes; ++i) {
+      const ProxyPoint x(rays.focus.x.v[i], rays.focus.y.v[i], rays.focus.z.v[i], rays.focus.w.v[i]);
+      if (needed.v[i] > 0 && emitters_.shown_by(view, x, cell_.angle_rad)) needed.v[i] = 0;
+    }
     cell_of(candidates_[c]).seen(view, rays.focus, needed, seen_lanes_[c], weights_[c]);
     penalize(view, rays.p, rays.focus, weights_[c], penalties_[c]);
   };

@@ -3,13 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <numeric>
 
-#include "common/demosaic.h"
 #include "common/error.h"
 
 namespace mf {
@@ -20,8 +17,10 @@ struct Disc {
   int x0, x1, y0, y1;  // its bounding box, ends excluded
   SessionHeader::Reference reference;
 
-  [[nodiscard]] bool holds(int x, int y) const {
-    return std::hypot(x + 0.5 - reference.x_px, y + 0.5 - reference.y_px) <= reference.radius_px;
+  // Whether it touches the pixel, which reaches from x to x + 1.
+  [[nodiscard]] bool touches(int x, int y) const {
+    return std::hypot(std::clamp(reference.x_px, x + 0., x + 1.) - reference.x_px,
+                      std::clamp(reference.y_px, y + 0., y + 1.) - reference.y_px) < reference.radius_px;
   }
 };
 
@@ -42,122 +41,70 @@ void require_unsaturated(const Disc& disc, const Frame& frame, double saturation
   for (int y = disc.y0; y < disc.y1; ++y)
     for (int x = disc.x0; x < disc.x1; ++x)
       for (int c = 0; c < codes.channels; ++c)
-        if (disc.holds(x, y) && codes.at(x, y, c) >= saturation)
+        if (disc.touches(x, y) && codes.at(x, y, c) >= saturation)
           throw InputError(session, "reference",
                            fmt::format("pixel ({}, {}) of {} is saturated: take the reading on a darker spot", x, y,
                                        disc.reference.frame));
 }
 
-bool has_saturation(const Disc& disc, const Frame& frame, double saturation) {
-  if (!std::holds_alternative<ImageU16>(frame.pixels)) return false;
-  const ImageU16& codes = std::get<ImageU16>(frame.pixels);
+// The disc's pixels by channel: a mosaic's as they are, without what a demosaicing makes up between them.
+std::vector<std::vector<double>> values_in(const Disc& disc, const ImageF& linear, PixelLayout layout,
+                                           std::size_t channels) {
+  std::vector<std::vector<double>> values(channels);
   for (int y = disc.y0; y < disc.y1; ++y)
     for (int x = disc.x0; x < disc.x1; ++x)
-      for (int c = 0; c < codes.channels; ++c)
-        if (disc.holds(x, y) && codes.at(x, y, c) >= saturation) return true;
-  return false;
+      for (int c = 0; c < linear.channels; ++c)
+        if (disc.touches(x, y))
+          values[static_cast<std::size_t>(linear.channels > 1 ? c : colour_at(layout, x, y))].push_back(
+              static_cast<double>(linear.at(x, y, c)));
+  return values;
 }
 
-// An estimate of the mean over the disc, and its standard deviation.
-struct Estimate {
-  double value = 0;
-  double sigma = 0;
+// What a disc tells of one channel's scale.
+struct ChannelScale {
+  double scale = 0;     // the reading over the mean of the channel's pixels
+  double variance = 0;  // of its logarithm
 };
 
-std::vector<Estimate> mean_over(const Disc& disc, const ImageF& picture) {
-  std::vector<Estimate> means(static_cast<std::size_t>(picture.channels));
-  double count = 0;
-  for (int y = disc.y0; y < disc.y1; ++y)
-    for (int x = disc.x0; x < disc.x1; ++x) {
-      if (!disc.holds(x, y)) continue;
-      ++count;
-      for (std::size_t c = 0; c < means.size(); ++c)
-        means[c].value += static_cast<double>(picture.at(x, y, static_cast<int>(c)));
-    }
-  for (Estimate& mean : means) mean.value /= count;
-  return means;
+ChannelScale scale_of(const std::vector<double>& values, double reading) {
+  const auto n = static_cast<double>(values.size());
+  const double mean = std::accumulate(values.begin(), values.end(), 0.) / n;
+  double squares = 0;
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return {reading / mean, squares / std::max(n - 1, 1.) / n / (mean * mean)};
 }
 
-// Noise of one cell: the median difference of neighbours, which neither slopes nor edges raise much.
-double cell_noise(const Disc& disc, const ImageF& cells, int channel) {
-  std::vector<double> differences;
-  for (int y = disc.y0 / 2; y < disc.y1 / 2; ++y)
-    for (int x = disc.x0 / 2; x + 1 < disc.x1 / 2; ++x)
-      differences.push_back(std::abs(static_cast<double>(cells.at(x + 1, y, channel) - cells.at(x, y, channel))));
-  if (differences.empty()) return 0;
-  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
-  std::nth_element(differences.begin(), middle, differences.end());
-  constexpr double sigma_per_median = 1.4826 / std::numbers::sqrt2;  // of a difference of two normal variables
-  return *middle * sigma_per_median;
-}
-
-// Value at the disc's centre of the plane (value, slopes) that fits the 2 × 2 cells within it best. A disc being
-// symmetric, that is its mean.
-Estimate plane_at_centre(const Disc& disc, const ImageF& cells, int channel, double noise) {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (int y = disc.y0 / 2; y < disc.y1 / 2; ++y)
-    for (int x = disc.x0 / 2; x < disc.x1 / 2; ++x) {
-      const Eigen::Vector3d row(1, 2 * x + 1 - disc.reference.x_px, 2 * y + 1 - disc.reference.y_px);
-      if (row.tail<2>().norm() > disc.reference.radius_px) continue;
-      normal += row * row.transpose();
-      right += row * static_cast<double>(cells.at(x, y, channel));
-    }
-  const Eigen::Matrix3d covariance = normal.inverse();
-  return {(covariance * right)[0], noise * std::sqrt(covariance(0, 0))};
-}
-
-Disc widened(const Disc& disc, double times) {
-  Disc wide = disc;
-  wide.reference.radius_px *= times;
-  const SessionHeader::Reference& r = wide.reference;
-  wide.x0 = static_cast<int>(std::floor(r.x_px - r.radius_px));
-  wide.x1 = static_cast<int>(std::ceil(r.x_px + r.radius_px));
-  wide.y0 = static_cast<int>(std::floor(r.y_px - r.radius_px));
-  wide.y1 = static_cast<int>(std::ceil(r.y_px + r.radius_px));
-  return wide;
-}
-
-bool agree(const std::vector<Estimate>& a, const std::vector<Estimate>& b) {
-  constexpr double sigmas = 1;  // of each: their intervals touch
-  for (std::size_t c = 0; c < a.size(); ++c)
-    if (std::abs(a[c].value - b[c].value) > sigmas * (a[c].sigma + b[c].sigma)) return false;
-  return true;
-}
-
-// The mean over the disc, by channel. A small disc holds few pixels, each with its own noise: as long as a wider disc
-// tells the same within the noise, its plane fit says it more exactly (intersecting confidence intervals: Goldenshluger
-// and Nemirovski 1997).
-std::vector<double> disc_means(const Disc& disc, const Frame& frame, const ImageF& picture, const ImageF& cells,
-                               double saturation) {
-  constexpr double widest = 2.5;     // times the disc's radius: beyond, a slope is no plane any more
-  constexpr double smallest_px = 4;  // a dozen cells: fewer do not hold a plane
-  std::vector<std::vector<Estimate>> estimates{mean_over(disc, picture)};
-  std::vector<double> noise;
-  for (std::size_t c = 0; c < estimates[0].size(); ++c) {
-    noise.push_back(cell_noise(disc, cells, static_cast<int>(c)));
-    constexpr double cell_px = 4;
-    const double cells_in_disc = std::numbers::pi * disc.reference.radius_px * disc.reference.radius_px / cell_px;
-    estimates[0][c].sigma = noise[c] / std::sqrt(std::max(cells_in_disc, 1.0));
+// Variance of the channels' true scales (logarithms), beyond what their own variances explain: the moment estimate of
+// DerSimonian and Laird 1986, eq. 8.
+double variance_between(const std::vector<ChannelScale>& channels) {
+  double weights = 0, squares = 0, mean = 0;
+  for (const ChannelScale& c : channels) {
+    weights += 1 / c.variance;
+    squares += 1 / (c.variance * c.variance);
+    mean += std::log(c.scale) / c.variance;
   }
-  for (double times = 1.5; times <= widest; times += 0.25) {
-    const Disc wide = widened(disc, times);
-    if (wide.reference.radius_px < smallest_px) continue;
-    if (wide.x0 < 0 || wide.y0 < 0 || wide.x1 > picture.width || wide.y1 > picture.height ||
-        has_saturation(wide, frame, saturation))
-      break;
-    std::vector<Estimate> next;
-    for (std::size_t c = 0; c < noise.size(); ++c) {
-      noise[c] = cell_noise(wide, cells, static_cast<int>(c));
-      next.push_back(plane_at_centre(wide, cells, static_cast<int>(c), noise[c]));
-    }
-    if (!std::all_of(estimates.begin(), estimates.end(), [&](const auto& earlier) { return agree(earlier, next); }))
-      break;
-    estimates.push_back(std::move(next));
+  mean /= weights;
+  double spread = 0;
+  for (const ChannelScale& c : channels) spread += std::pow(std::log(c.scale) - mean, 2) / c.variance;
+  return std::max(0., (spread - static_cast<double>(channels.size() - 1)) / (weights - squares / weights));
+}
+
+// A mosaic shows each channel at some of the disc's pixels only, and a textured or noisy spot is another there than
+// over all of the disc, which the meter saw. Were the channels' scales all one s, every pixel would tell it, whatever
+// its colour: s = n / Σ v / reading. Each channel's own estimate is drawn towards that as far as chance explains the
+// difference (empirical Bayes). A camera whose channels do differ keeps its differences.
+void share_between_channels(const std::vector<std::vector<double>>& values, const std::vector<double>& readings,
+                            std::vector<ChannelScale>& channels) {
+  double sum = 0, count = 0;
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    for (const double v : values[c]) sum += v / readings[c];
+    count += static_cast<double>(values[c].size());
   }
-  std::vector<double> means;
-  for (const Estimate& best : estimates.back()) means.push_back(best.value);
-  return means;
+  const double common = count / sum;
+  constexpr double exact = 1e-12;  // an even patch without noise: its channels are as they are
+  for (ChannelScale& c : channels) c.variance = std::max(c.variance, exact);
+  const double between = variance_between(channels);
+  for (ChannelScale& c : channels) c.scale = common * std::pow(c.scale / common, between / (between + c.variance));
 }
 
 }  // namespace
@@ -167,23 +114,28 @@ std::vector<double> reference_scale(const SessionHeader::Reference& reference, c
   ResponseCurve relative = curve;
   std::fill(relative.radiance_scale.begin(), relative.radiance_scale.end(), 1.0);
   const ImageF linear = linearize(frame, format, relative);
-  const ImageF picture = demosaic(linear, format.layout);
-  const auto channels = static_cast<std::size_t>(picture.channels);
+  const auto channels = static_cast<std::size_t>(format.colour_channels());
   if (reference.radiance.size() != channels || !std::all_of(reference.radiance.begin(), reference.radiance.end(),
                                                             [](double v) { return v > 0 && std::isfinite(v); }))
     throw InputError(session, "reference.radiance",
                      fmt::format("needs {} positive number{}", channels, channels == 1 ? "" : "s, one a channel"));
   const Disc disc = disc_in(reference, linear.width, linear.height, session);
   require_unsaturated(disc, frame, curve.saturation_code, session);
-  std::vector<double> scale;
-  const std::vector<double> means =
-      disc_means(disc, frame, picture, bin_cells(linear, format.layout), curve.saturation_code);
+  const std::vector<std::vector<double>> values = values_in(disc, linear, format.layout, channels);
+  std::vector<ChannelScale> scales;
   for (std::size_t c = 0; c < channels; ++c) {
-    if (!(means[c] > 0))
+    if (values[c].empty())
+      throw InputError(session, "reference.radius_px",
+                       "holds no pixel of some colour: take the reading on a larger disc");
+    if (!(std::accumulate(values[c].begin(), values[c].end(), 0.) > 0))
       throw InputError(session, "reference",
                        fmt::format("{} is black at the disc: check its position and the frame", reference.frame));
-    scale.push_back(reference.radiance[c] / means[c]);
+    scales.push_back(scale_of(values[c], reference.radiance[c]));
   }
+  const bool mosaic = linear.channels == 1 && channels > 1;
+  if (mosaic) share_between_channels(values, reference.radiance, scales);
+  std::vector<double> scale;
+  for (const ChannelScale& c : scales) scale.push_back(c.scale);
   return scale;
 }
 

@@ -37,49 +37,6 @@ double light_of_surroundings(const LightField& field, const Eigen::Vector3f& x, 
   return std::max(0., sum);
 }
 
-// Adds what an emitter brings to points of a box, by the cells in which they see it.
-class EmitterLight {
- public:
-  EmitterLight(const LightField& field, const Bounds& object)
-      : field_(field), object_(object), locator_(field.directions) {}
-
-  void add(const ShadedEmitter& e, std::vector<double>& light) const {
-    for (int i = 0; i < points * points * points; ++i) {
-      const Eigen::Array3f at = Eigen::Array3i(i % points, i / points % points, i / (points * points)).cast<float>();
-      add_seen_from(object_.low + (object_.high - object_.low).cwiseProduct((at / (points - 1)).matrix()), e, light);
-    }
-  }
-
- private:
-  static constexpr int points = 5;    // along each side of the box
-  static constexpr int on_disc = 54;  // points over the emitter's
-
-  void add_seen_from(const Eigen::Vector3f& x, const ShadedEmitter& e, std::vector<double>& light) const {
-    const Rigid3& world_from_plane = field_.plane.world_from_plane;
-    const Eigen::Vector3f to = (world_from_plane.inverse() * e.emitter.position.cast<double>()).cast<float>() - x;
-    const Eigen::Vector3f across = to.unitOrthogonal(), up = to.normalized().cross(across);
-    const float sine = e.emitter.radius_m / std::max(to.norm(), e.emitter.radius_m);
-    const float weight = std::numbers::pi_v<float> * sine * sine / (on_disc * points * points * points);
-    for (int k = 0; k < on_disc; ++k) {  // equal areas
-      const float radius = e.emitter.radius_m * std::sqrt((static_cast<float>(k) + 0.5F) / on_disc);
-      const float angle = static_cast<float>(k) * 2.3999632F;  // golden
-      const Eigen::Vector3f d = (to + radius * (std::cos(angle) * across + std::sin(angle) * up)).normalized();
-      if (d.z() < 0.02F) continue;  // looks along the plane: outside every rectangle
-      const Eigen::Vector3f p = x - d * (x.z() / d.z());
-      const auto visible = e.visibility((world_from_plane * p.cast<double>()).cast<float>(),
-                                        (world_from_plane.rotation * d.cast<double>()).cast<float>());
-      const DirectionWeights w = locator_.locate(d);
-      const auto nearest =
-          static_cast<std::size_t>(std::max_element(w.weight.begin(), w.weight.end()) - w.weight.begin());
-      light[w.index[nearest]] += static_cast<double>(weight * visible.value_or(1) * luminance_of(e.radiance));
-    }
-  }
-
-  const LightField& field_;
-  const Bounds& object_;
-  DirectionLocator locator_;
-};
-
 // ---- groups ----
 
 // Light, and a trace of it by solid angle, so that cells without any have a direction and are cut evenly.
@@ -184,9 +141,6 @@ std::vector<double> light_on(const LightField& field, const Bounds& object_in_pl
   const Eigen::Matrix3f world_from_plane = field.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
   tbb::parallel_for(std::size_t{0}, light.size(),
                     [&](std::size_t i) { light[i] = light_of_surroundings(field, x, world_from_plane, i); });
-  if (field.emitters.empty()) return light;
-  const EmitterLight emitters(field, object_in_plane);
-  for (const ShadedEmitter& e : field.emitters) emitters.add(e, light);
   return light;
 }
 

@@ -28,9 +28,8 @@ struct CellGroup {
 };
 
 // The light (luminance times solid angle, any unit) that each cell of a field brings to an object: from the panorama of
-// the surroundings as seen from the object's middle, and from the emitters, through their masks, as seen from points
-// all over the object's box. It needs no texel, so a field and the capture that it is made of say the same.
-// Precondition: the surroundings have a panorama.
+// the surroundings as seen from the object's middle. Emitters are lights of their own (emitter_lights.h). It needs no
+// texel, so a field and the capture that it is made of say the same. Precondition: the surroundings have a panorama.
 [[nodiscard]] std::vector<double> light_on(const LightField&, const Bounds& object_in_plane);
 
 // The same from each cell's tile: its mean. Precondition: a tile for each direction.

@@ -10,6 +10,7 @@ namespace mf {
 namespace {
 
 constexpr int bounce_directions = 320;  // of the light that reaches the object before the bounce
+constexpr int bounce_emitter_points = 16;
 
 std::vector<PlaneImage> images(std::span<const PlaneTile> tiles) {
   std::vector<PlaneImage> result;
@@ -17,21 +18,33 @@ std::vector<PlaneImage> images(std::span<const PlaneTile> tiles) {
   return result;
 }
 
-std::vector<double> light_in(const LightField& field, const Bounds& object_in_plane) {
+std::vector<double> light_in(const LightField& field, std::span<const PlaneImage> dark, const Bounds& object_in_plane) {
   if (!field.surroundings.panorama.empty()) return light_on(field, object_in_plane);
-  return light_of_tiles(field.directions, images_of(field));
+  return light_of_tiles(field.directions, dark);
 }
 
-IncidentLight assemble(const DirectionSet& set, const PlaneRectangle& rectangle, const LightPlan& plan,
-                       std::vector<PlaneImage> of_groups, std::vector<PlaneImage> of_bounce,
-                       const LightOptions& options) {
+// How many points each emitter gets: in a preview a share of the picture's directions.
+int points_of_emitters(const LightOptions& options) {
+  constexpr int share = 4, fewest = 16;
+  const int most = options.importance.emitter_points;
+  return options.directions == 0 ? most : std::min(most, std::max(fewest, options.directions / share));
+}
+
+void assemble(const LightField& field, const Bounds& object_in_plane, const LightPlan& plan,
+              std::vector<PlaneImage> of_groups, std::vector<PlaneImage> of_bounce, const LightOptions& options,
+              IncidentLight& light) {
   const bool same = plan.bounce_groups.empty();
-  IncidentLight light;
-  light.plane = rectangle;
+  const DirectionSet& set = field.directions;
+  light.plane = field.plane;
   light.for_bounce = make_light_set(set, same ? plan.groups : plan.bounce_groups, same ? of_groups : of_bounce, {0, 1});
   light.from_above = make_light_set(set, plan.groups, std::move(of_groups), options.importance);
   if (options.plane) light.bare = bare_irradiance(light.from_above);
-  return light;
+  const int points = points_of_emitters(options);
+  light.emitters = emitter_lights(field, object_in_plane, options.plane, points);
+  light.emitters_for_bounce =
+      emitter_lights(field, object_in_plane, options.plane, std::min(points, bounce_emitter_points));
+  append_emitters(light.from_above, light.emitters);
+  append_emitters(light.for_bounce, light.emitters_for_bounce);
 }
 
 }  // namespace
@@ -54,27 +67,32 @@ LightPlan plan_light(const DirectionSet& set, std::span<const double> light, con
   return plan;
 }
 
-IncidentLight incident_light(const DirectionSet& set, const PlaneRectangle& rectangle, const LightPlan& plan,
+IncidentLight incident_light(const LightField& field, const Bounds& object_in_plane, const LightPlan& plan,
                              std::vector<PlaneTile> tiles, const LightOptions& options) {
   check(tiles.size() == plan.requests.size(), "a tile for each request");
   std::vector<PlaneImage> of_groups = images(tiles);
   std::vector<PlaneImage> of_bounce(of_groups.begin() + static_cast<std::ptrdiff_t>(plan.groups.size()),
                                     of_groups.end());
   of_groups.resize(plan.groups.size());
-  IncidentLight light = assemble(set, rectangle, plan, std::move(of_groups), std::move(of_bounce), options);
+  IncidentLight light;
   light.tiles = std::move(tiles);
+  assemble(field, object_in_plane, plan, std::move(of_groups), std::move(of_bounce), options, light);
   return light;
 }
 
 IncidentLight incident_light(const LightField& field, const Bounds& object_in_plane, const LightOptions& options) {
-  const std::vector<double> brought = light_in(field, object_in_plane);
+  DarkTiles dark = tiles_without_emitters(field);
+  const std::vector<double> brought = light_in(field, dark.images, object_in_plane);
   const LightPlan plan = plan_light(field.directions, brought, object_in_plane, field.plane, options);
   if (options.directions > 0)
-    return incident_light(field.directions, field.plane, plan, merged_tiles(field, plan.requests), options);
+    return incident_light(field, object_in_plane, plan, merged_tiles(field.directions, dark.images, plan.requests),
+                          options);
   // Every cell by itself: no tile needs to be copied but for the bounce.
-  std::vector<PlaneTile> merged = merged_tiles(field, std::span(plan.requests).subspan(plan.groups.size()));
-  IncidentLight light = assemble(field.directions, field.plane, plan, images_of(field), images(merged), options);
-  light.tiles = std::move(merged);
+  IncidentLight light;
+  light.tiles = merged_tiles(field.directions, dark.images, std::span(plan.requests).subspan(plan.groups.size()));
+  std::vector<PlaneImage> of_groups = dark.images;
+  light.dark = std::move(dark);
+  assemble(field, object_in_plane, plan, std::move(of_groups), images(light.tiles), options, light);
   return light;
 }
 

@@ -60,12 +60,40 @@ bool may_meet(const Bounds& bounds, const Eigen::Vector3f& centre, float radius,
   return enter <= leave;
 }
 
+// From the lanes' points towards one light: unit directions, how far it is, and under which solid angle it is seen.
+struct alignas(64) Rays {
+  Lanes dx, dy, dz;
+  Lanes length, solid_angle;
+};
+
+Rays towards(const DirectionalLight& light) {
+  Rays rays;
+  rays.dx.fill(light.direction.x()), rays.dy.fill(light.direction.y()), rays.dz.fill(light.direction.z());
+  rays.length.fill(std::numeric_limits<float>::infinity());
+  rays.solid_angle.fill(light.solid_angle_sr);
+  return rays;
+}
+
+Rays towards(const EmitterPoint& light, const Packet& p) {
+  constexpr float flattest = 1e-3F;  // rays that rise less do not cross the plane anywhere near
+  Rays rays;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const Eigen::Vector3f x(p.x[i], p.y[i], p.z[i]);
+    const Eigen::Vector3f to = light.position - x;
+    rays.length[i] = to.norm();
+    const Eigen::Vector3f d = to / std::max(rays.length[i], 1e-12F);
+    rays.dx[i] = d.x(), rays.dy[i] = d.y(), rays.dz[i] = std::max(d.z(), flattest);
+    rays.solid_angle[i] = d.z() > flattest ? light.solid_angle_from(x) : 0;
+  }
+  return rays;
+}
+
 // max(0, n·ω), zero too where the light is behind the triangle (when `one_sided`). Returns whether any lane is lit.
-bool cosines(const Packet& p, const Eigen::Vector3f& w, bool one_sided, Lanes& cosine) {
+bool cosines(const Packet& p, const Rays& w, bool one_sided, Lanes& cosine) {
   float most = 0;
   for (std::size_t i = 0; i < lanes; ++i) {
-    const float shading = p.nx[i] * w.x() + p.ny[i] * w.y() + p.nz[i] * w.z();
-    const float geometric = p.gx[i] * w.x() + p.gy[i] * w.y() + p.gz[i] * w.z();
+    const float shading = p.nx[i] * w.dx[i] + p.ny[i] * w.dy[i] + p.nz[i] * w.dz[i];
+    const float geometric = p.gx[i] * w.dx[i] + p.gy[i] * w.dy[i] + p.gz[i] * w.dz[i];
     const bool lit = !one_sided || geometric > 0;
     cosine[i] = lit ? std::max(shading, 0.F) : 0.F;
     most = std::max(most, cosine[i]);
@@ -78,14 +106,14 @@ class Tracer {
   Tracer(const RayScene& scene, LightSum sum) : scene_(&scene), sum_(sum), context_(coherent_context()) {}
 
   // Zeroes the cosine of every lane that the sum leaves out. Returns whether any is left.
-  bool mask(const Packet& packet, const Eigen::Vector3f& direction, Lanes& cosine) {
+  bool mask(const Packet& packet, const Rays& rays, Lanes& cosine) {
     alignas(64) std::array<int, lanes> active{};
     RTCRay16 ray;
     for (std::size_t i = 0; i < lanes; ++i) {
       active[i] = cosine[i] > 0 ? -1 : 0;
       ray.org_x[i] = packet.ox[i], ray.org_y[i] = packet.oy[i], ray.org_z[i] = packet.oz[i];
-      ray.dir_x[i] = direction.x(), ray.dir_y[i] = direction.y(), ray.dir_z[i] = direction.z();
-      ray.tnear[i] = 0, ray.tfar[i] = std::numeric_limits<float>::infinity();
+      ray.dir_x[i] = rays.dx[i], ray.dir_y[i] = rays.dy[i], ray.dir_z[i] = rays.dz[i];
+      ray.tnear[i] = 0, ray.tfar[i] = rays.length[i];
       ray.time[i] = 0, ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
     }
     rtcOccluded16(active.data(), scene_->handle(), &context_, &ray);
@@ -106,14 +134,12 @@ class Tracer {
 
 using Sums = std::array<Eigen::Vector4f, lanes>;
 
-void add_light(const Packet& packet, const DirectionalLight& light, const PlaneImage& image, const Lanes& cosine,
-               Sums& sums) {
-  const float sx = light.direction.x() / light.direction.z();
-  const float sy = light.direction.y() / light.direction.z();
+void add_light(const Packet& packet, const Rays& rays, const PlaneImage& image, const Lanes& cosine, Sums& sums) {
   for (std::size_t i = 0; i < lanes; ++i) {
     if (cosine[i] <= 0) continue;
-    const Eigen::Vector2f p(packet.x[i] - sx * packet.z[i], packet.y[i] - sy * packet.z[i]);
-    sums[i] += (cosine[i] * light.solid_angle_sr) * sample(image, p);
+    const float along = packet.z[i] / rays.dz[i];
+    const Eigen::Vector2f p(packet.x[i] - rays.dx[i] * along, packet.y[i] - rays.dy[i] * along);
+    sums[i] += (cosine[i] * rays.solid_angle[i]) * sample(image, p);
   }
 }
 
@@ -134,30 +160,59 @@ Block make_block(std::span<const SurfacePoint> points, float offset) {
   return block;
 }
 
-void sum_block(const RayScene& scene, std::span<const SurfacePoint> points, const LightSet& set, LightSum sum,
-               Eigen::Vector3f* result) {
-  const Block block = make_block(points, scene.surface_offset_m());
-  Sums zero;
-  zero.fill(Eigen::Vector4f::Zero());
-  std::vector<Sums> sums(block.packets.size(), zero);
-  Tracer tracer(scene, sum);
-  const bool blocked = sum == LightSum::blocked;
-  alignas(64) Lanes cosine;
-  for (const DirectionalLight& light : set.lights) {
-    const Eigen::Vector3f& w = light.direction;
-    const bool near = may_meet(scene.bounds(), block.centre, block.radius, w);
-    if (blocked && !near) continue;
-    for (std::size_t k = 0; k < block.packets.size(); ++k) {
-      const Packet& packet = block.packets[k];
-      const bool trace = near && may_meet(scene.bounds(), packet.centre, packet.radius, w);
-      if (blocked && !trace) continue;
-      if (!cosines(packet, w, !blocked, cosine)) continue;
-      if (trace && !tracer.mask(packet, w, cosine)) continue;
-      add_light(packet, light, set.images[light.image], cosine, sums[k]);
-    }
+// The sums of one block's points over the lights of a set.
+class BlockSum {
+ public:
+  BlockSum(const RayScene& scene, std::span<const SurfacePoint> points, const LightSet& set, LightSum sum)
+      : scene_(scene),
+        set_(set),
+        block_(make_block(points, scene.surface_offset_m())),
+        blocked_(sum == LightSum::blocked),
+        tracer_(scene, sum) {
+    Sums zero;
+    zero.fill(Eigen::Vector4f::Zero());
+    sums_.assign(block_.packets.size(), zero);
   }
-  for (std::size_t i = 0; i < points.size(); ++i) result[i] = sums[i / lanes][i % lanes].head<3>();
-}
+
+  void run() {
+    for (const DirectionalLight& light : set_.lights) {
+      const Rays rays = towards(light);
+      const bool near = may_meet(scene_.bounds(), block_.centre, block_.radius, light.direction);
+      if (blocked_ && !near) continue;
+      for (std::size_t k = 0; k < block_.packets.size(); ++k) {
+        const Packet& packet = block_.packets[k];
+        add(k, rays, light.image, near && may_meet(scene_.bounds(), packet.centre, packet.radius, light.direction));
+      }
+    }
+    for (const EmitterPoint& light : set_.emitter_points)
+      for (std::size_t k = 0; k < block_.packets.size(); ++k) {
+        const Packet& packet = block_.packets[k];
+        // Lines from a ball to one point stay within its radius of the line from its middle.
+        const Eigen::Vector3f direction = (light.position - packet.centre).normalized();
+        add(k, towards(light, packet), light.image, may_meet(scene_.bounds(), packet.centre, packet.radius, direction));
+      }
+  }
+  void store(std::span<Eigen::Vector3f> result) const {
+    for (std::size_t i = 0; i < result.size(); ++i) result[i] = sums_[i / lanes][i % lanes].head<3>();
+  }
+
+ private:
+  // `trace`: whether the mesh may be in the way.
+  void add(std::size_t k, const Rays& rays, std::uint32_t image, bool trace) {
+    alignas(64) Lanes cosine;
+    if (blocked_ && !trace) return;
+    if (!cosines(block_.packets[k], rays, !blocked_, cosine)) return;
+    if (trace && !tracer_.mask(block_.packets[k], rays, cosine)) return;
+    add_light(block_.packets[k], rays, set_.images[image], cosine, sums_[k]);
+  }
+
+  const RayScene& scene_;
+  const LightSet& set_;
+  Block block_;
+  bool blocked_;
+  Tracer tracer_;
+  std::vector<Sums> sums_;
+};
 
 }  // namespace
 
@@ -171,7 +226,9 @@ std::vector<Eigen::Vector3f> irradiance_cpu(const RayScene& scene, std::span<con
   tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t b) {
     const std::size_t first = b * block;
     const std::size_t count = std::min(block, points.size() - first);
-    sum_block(scene, points.subspan(first, count), set, sum, result.data() + first);
+    BlockSum block_sum(scene, points.subspan(first, count), set, sum);
+    block_sum.run();
+    block_sum.store(std::span(result).subspan(first, count));
     const std::size_t finished = ++done;
     const std::lock_guard lock(reporting);
     report_progress(progress, "light (cpu)", static_cast<double>(finished) / static_cast<double>(blocks));

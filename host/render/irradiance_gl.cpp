@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
+#include <variant>
 
 #include "common/check.h"
 #include "host/gl/gl_objects.h"
@@ -12,15 +15,18 @@ namespace mf {
 
 namespace {
 
-constexpr int max_lights = 32;  // shaders/common_lights.glsl
+constexpr std::size_t max_lights = 32;  // shaders/common_lights.glsl
 constexpr int row_points = 1024;
 
 // std140; mirrors Light and LightBlock of shaders/common_lights.glsl.
 struct GlslLight {
-  std::array<float, 4> direction;
+  std::array<float, 4> place;
+  std::array<float, 4> emitter;
+  std::array<float, 4> strength;
   std::array<float, 4> shadow_u;
   std::array<float, 4> shadow_v;
   std::array<float, 4> shadow_depth;
+  std::array<float, 4> shadow_w;
   std::array<float, 4> image;
   std::array<float, 4> plane;
 };
@@ -28,10 +34,11 @@ struct GlslLightBlock {
   std::array<GlslLight, max_lights> lights;
   std::array<int, 4> count;
 };
-static_assert(offsetof(GlslLight, shadow_u) == 16 && offsetof(GlslLight, shadow_v) == 32 &&
-              offsetof(GlslLight, shadow_depth) == 48 && offsetof(GlslLight, image) == 64 &&
-              offsetof(GlslLight, plane) == 80 && sizeof(GlslLight) == 96);
-static_assert(offsetof(GlslLightBlock, count) == 96 * max_lights);
+static_assert(offsetof(GlslLight, emitter) == 16 && offsetof(GlslLight, strength) == 32 &&
+              offsetof(GlslLight, shadow_u) == 48 && offsetof(GlslLight, shadow_v) == 64 &&
+              offsetof(GlslLight, shadow_depth) == 80 && offsetof(GlslLight, shadow_w) == 96 &&
+              offsetof(GlslLight, image) == 112 && offsetof(GlslLight, plane) == 128 && sizeof(GlslLight) == 144);
+static_assert(offsetof(GlslLightBlock, count) == 144 * max_lights);
 
 // The coordinate (dot(axis, x) − low) / (high − low) over the corners of a box.
 struct Extent {
@@ -50,25 +57,76 @@ struct Extent {
   }
 };
 
-GlslLight make_light(const DirectionalLight& light, const PlaneImage& image, const Bounds& box, int shadow_map_size) {
+// What a layer of shadow maps shows: one light, and the image that goes with it.
+using AnyLight = std::variant<DirectionalLight, EmitterPoint>;
+
+std::uint32_t image_of(const AnyLight& light) {
+  return std::visit([](const auto& l) { return l.image; }, light);
+}
+
+GlslLight shadow_of(const DirectionalLight& light, const Bounds& box, int shadow_map_size) {
   const Eigen::Vector3f& w = light.direction;
   const Eigen::Vector3f axis_u = w.unitOrthogonal();
   const Extent u(axis_u, box), v(w.cross(axis_u), box);
   const Extent depth(-w, box);  // grows away from the light
-  const float texel = std::max(u.size, v.size) / static_cast<float>(shadow_map_size);
+  GlslLight out{};
+  out.place = {w.x(), w.y(), w.z(), 0};
+  out.strength = {light.solid_angle_sr, 0, 0, 0};
+  out.shadow_u = u.coordinate();
+  out.shadow_v = v.coordinate();
+  out.shadow_depth = depth.coordinate();
+  out.shadow_w = {0, 0, 0, 1};
+  out.image[1] = std::max(u.size, v.size) / static_cast<float>(shadow_map_size);
+  return out;
+}
+
+// A pyramid from the point round the box: with d the distance ahead of the point, towards the box's middle,
+//
+//   u = 1/2 + a·(x − y) / (2 t d),   depth = far (d − near) / ((far − near) d)
+GlslLight shadow_of(const EmitterPoint& light, const Bounds& box, int shadow_map_size) {
+  const Eigen::Vector3f& y = light.position;
+  const Eigen::Vector3f ahead = ((box.high + box.low) / 2 - y).normalized();
+  const Eigen::Vector3f across = ahead.unitOrthogonal(), up = ahead.cross(across);
+  constexpr float rim = 1.02F;      // for the filter
+  constexpr float nearest = 0.01F;  // of the farthest: nearer than that, the object is not in the shadow map
+  constexpr float widest = 20;      // tangent: a lamp beside the box sees no more of it
+  float far = 1e-6F, near = std::numeric_limits<float>::infinity(), tangent = 1e-6F;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3f x((corner & 1) != 0 ? box.high.x() : box.low.x(),
+                            (corner & 2) != 0 ? box.high.y() : box.low.y(),
+                            (corner & 4) != 0 ? box.high.z() : box.low.z());
+    const float d = ahead.dot(x - y), side = std::max(std::abs(across.dot(x - y)), std::abs(up.dot(x - y)));
+    far = std::max(far, rim * d);
+    near = std::min(near, d / rim);
+    tangent = std::max(tangent, d * widest > side ? rim * side / d : widest);
+  }
+  near = std::max(near, nearest * far);
+  const auto row = [&](const Eigen::Vector3f& axis, float of_ahead, float offset) -> std::array<float, 4> {
+    const Eigen::Vector3f n = axis + of_ahead * ahead;
+    return {n.x(), n.y(), n.z(), offset - n.dot(y)};
+  };
+  GlslLight out{};
+  out.place = {y.x(), y.y(), y.z(), 1};
+  out.emitter = {light.centre.x(), light.centre.y(), light.centre.z(), light.radius_m};
+  out.strength = {light.share, 0, 0, 0};
+  out.shadow_u = row(across / (2 * tangent), 0.5F, 0);
+  out.shadow_v = row(up / (2 * tangent), 0.5F, 0);
+  const float stretch = far / (far - near);
+  out.shadow_depth = row(Eigen::Vector3f::Zero(), stretch, -stretch * near);
+  out.shadow_w = row(Eigen::Vector3f::Zero(), 1, 0);
+  out.image[1] = 2 * tangent * far / static_cast<float>(shadow_map_size);
+  return out;
+}
+
+GlslLight make_light(const AnyLight& light, const PlaneImage& image, const Bounds& box, int shadow_map_size) {
+  GlslLight out = std::visit([&](const auto& l) { return shadow_of(l, box, shadow_map_size); }, light);
   const Eigen::Vector2f size = image.max_m - image.min_m;
-  return {{w.x(), w.y(), w.z(), light.solid_angle_sr},
-          u.coordinate(),
-          v.coordinate(),
-          depth.coordinate(),
-          {0, texel, 0, 0},
-          {image.min_m.x(), image.max_m.y(), 1 / size.x(), 1 / size.y()}};
+  out.plane = {image.min_m.x(), image.max_m.y(), 1 / size.x(), 1 / size.y()};
+  return out;
 }
 
 // Lights whose images have one size in texels, at most max_lights.
-struct Batch {
-  std::span<const DirectionalLight> lights;
-};
+using Batch = std::vector<AnyLight>;
 
 bool same_size(const PlaneImage& a, const PlaneImage& b) {
   return a.width == b.width && a.height == b.height;
@@ -76,15 +134,14 @@ bool same_size(const PlaneImage& a, const PlaneImage& b) {
 
 std::vector<Batch> make_batches(const LightSet& set) {
   std::vector<Batch> batches;
-  const std::span<const DirectionalLight> all(set.lights);
-  for (std::size_t first = 0; first < all.size();) {
-    std::size_t end = first + 1;
-    while (end < all.size() && end - first < max_lights &&
-           same_size(set.images[all[first].image], set.images[all[end].image]))
-      ++end;
-    batches.push_back({all.subspan(first, end - first)});
-    first = end;
-  }
+  const auto add = [&](const AnyLight& light) {
+    if (batches.empty() || batches.back().size() == max_lights ||
+        !same_size(set.images[image_of(batches.back().front())], set.images[image_of(light)]))
+      batches.emplace_back();
+    batches.back().push_back(light);
+  };
+  for (const DirectionalLight& light : set.lights) add(light);
+  for (const EmitterPoint& point : set.emitter_points) add(point);
   return batches;
 }
 
@@ -158,14 +215,14 @@ void GlIrradiance::Impl::make_shadow_maps() {
 
 void GlIrradiance::Impl::upload_batch(const Batch& batch, const LightSet& set, const GlTexture& tiles) {
   GlslLightBlock block{};
-  block.count = {static_cast<int>(batch.lights.size()), 0, 0, 0};
+  block.count = {static_cast<int>(batch.size()), 0, 0, 0};
   glActiveTexture(GL_TEXTURE4);
   glBindTexture(GL_TEXTURE_2D_ARRAY, tiles.name());
   int layer = -1;
-  for (std::size_t i = 0; i < batch.lights.size(); ++i) {
-    const PlaneImage& image = set.images[batch.lights[i].image];
-    block.lights[i] = make_light(batch.lights[i], image, bounds, options.shadow_map_size);
-    if (i == 0 || batch.lights[i].image != batch.lights[i - 1].image) {  // points of one cell follow each other
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const PlaneImage& image = set.images[image_of(batch[i])];
+    block.lights[i] = make_light(batch[i], image, bounds, options.shadow_map_size);
+    if (i == 0 || image_of(batch[i]) != image_of(batch[i - 1])) {  // points of one cell follow each other
       ++layer;
       glTexSubImage3D(GL_TEXTURE_2D_ARRAY, 0, 0, 0, layer, image.width, image.height, 1, GL_RGBA, GL_FLOAT,
                       image.texels->data());
@@ -186,8 +243,7 @@ void GlIrradiance::Impl::draw_shadow_maps(const Batch& batch) {
   glClear(GL_DEPTH_BUFFER_BIT);
   glUseProgram(shadow_pass.name());
   glBindVertexArray(mesh_layout.name());
-  glDrawElementsInstanced(GL_TRIANGLES, index_count, GL_UNSIGNED_INT, nullptr,
-                          static_cast<GLsizei>(batch.lights.size()));
+  glDrawElementsInstanced(GL_TRIANGLES, index_count, GL_UNSIGNED_INT, nullptr, static_cast<GLsizei>(batch.size()));
 }
 
 void GlIrradiance::Impl::accumulate(GLuint target, int rows, LightSum sum) {
@@ -224,7 +280,8 @@ GlIrradiance::~GlIrradiance() = default;
 
 std::vector<Eigen::Vector3f> GlIrradiance::irradiance(std::span<const SurfacePoint> points, const LightSet& set,
                                                       LightSum sum, const Progress& progress) {
-  if (points.empty() || set.lights.empty()) return {points.size(), Eigen::Vector3f::Zero()};
+  if (points.empty() || (set.lights.empty() && set.emitter_points.empty()))
+    return {points.size(), Eigen::Vector3f::Zero()};
   const int rows = static_cast<int>((points.size() + row_points - 1) / row_points);
   std::array<GlTexture, 3> g_buffer;
   glActiveTexture(GL_TEXTURE0);
@@ -246,7 +303,7 @@ std::vector<Eigen::Vector3f> GlIrradiance::irradiance(std::span<const SurfacePoi
   GlTexture tiles;
   const PlaneImage* layout = nullptr;
   for (std::size_t b = 0; b < batches.size(); ++b) {
-    const PlaneImage& image = set.images[batches[b].lights.front().image];
+    const PlaneImage& image = set.images[image_of(batches[b].front())];
     if (layout == nullptr || layout->width != image.width || layout->height != image.height) {
       tiles = make_texture();
       glActiveTexture(GL_TEXTURE4);

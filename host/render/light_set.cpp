@@ -46,6 +46,7 @@ bool same_grid(const PlaneImage& a, const PlaneImage& b) {
 std::optional<std::string> ImportanceOptions::validate() const {
   if (extra_directions < 0 || extra_directions > 100000) return "extra_directions must lie between 0 and 100000";
   if (most_per_cell < 1 || most_per_cell > 1024) return "most_per_cell must lie between 1 and 1024";
+  if (emitter_points < 1 || emitter_points > 1024) return "emitter_points must lie between 1 and 1024";
   return std::nullopt;
 }
 
@@ -75,15 +76,18 @@ LightSet make_light_set(const LightField& field, const ImportanceOptions& option
 }
 
 PlaneTile bare_irradiance(const LightSet& set) {
-  const auto largest = std::max_element(set.images.begin(), set.images.end(),
-                                        [](const auto& a, const auto& b) { return a.texel_count() < b.texel_count(); });
-  if (largest == set.images.end()) return {};
+  const auto texels = [&](const DirectionalLight& light) { return set.images[light.image].texel_count(); };
+  const auto finest = std::max_element(set.lights.begin(), set.lights.end(),
+                                       [&](const auto& a, const auto& b) { return texels(a) < texels(b); });
+  if (finest == set.lights.end()) return {};
+  const PlaneImage* largest = &set.images[finest->image];
   PlaneTile sum{largest->min_m, largest->max_m, largest->width, largest->height, {}};
   sum.texels.assign(largest->texel_count(), Eigen::Vector4f::Zero());
   const std::vector<float> weights = weights_on_plane(set);
   tbb::parallel_for(0, sum.height, [&](int y) {
     Eigen::Vector4f* row = sum.texels.data() + static_cast<std::ptrdiff_t>(y) * sum.width;
     for (std::size_t i = 0; i < set.images.size(); ++i) {
+      if (weights[i] == 0) continue;
       const PlaneImage& image = set.images[i];
       const bool same = same_grid(image, *largest);
       const Eigen::Vector4f* same_row = image.texels + static_cast<std::ptrdiff_t>(y) * sum.width;
@@ -91,6 +95,16 @@ PlaneTile bare_irradiance(const LightSet& set) {
         row[x] += weights[i] * (same ? same_row[x] : sample(image, sum.position(x, y)));
     }
   });
+  return sum;
+}
+
+Eigen::Vector3f emitted_irradiance(const LightSet& set, const Eigen::Vector2f& p) {
+  const Eigen::Vector3f x(p.x(), p.y(), 0);
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (const EmitterPoint& point : set.emitter_points) {
+    const float cosine = std::max(0.F, (point.position - x).normalized().z());
+    sum += cosine * point.solid_angle_from(x) * sample(set.images[point.image], p).head<3>();
+  }
   return sum;
 }
 

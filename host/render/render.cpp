@@ -51,7 +51,7 @@ class Renderer {
     const GroundLight ground = light_ground();
     LightSet lights = input_->light.from_above;
     if (input_->ground) append_ground_light(lights, ground.radiance.image(), options_->ground_directions);
-    result.lights = lights.lights.size();
+    result.lights = lights.lights.size() + lights.emitter_points.size();
     result.fragments = g.points.size() + g.ground_points.size();
     shade_object(g, lights, result);
     shade_ground(g, ground, result);
@@ -138,9 +138,7 @@ class Renderer {
     }
   }
 
-  [[nodiscard]] Eigen::Vector3f bare_at(const Eigen::Vector2f& p) const {
-    return sample(input_->light.bare.image(), p).head<3>();
-  }
+  [[nodiscard]] Eigen::Vector3f bare_at(const Eigen::Vector2f& p) const { return input_->light.on_bare_plane(p); }
 
   // Beyond the grid the object's light is less than a thousandth of what it is beneath it: none.
   static Eigen::Vector3f bounce_at(const GroundRadiance& bounce, const Eigen::Vector3f& p) {
@@ -177,8 +175,8 @@ GroundRadiance diffuse_ground(const IncidentLight& light, const TriangleMesh& me
   GroundRadiance ground = ground_around(bounds_of(mesh), ground_texels);
   for (int y = 0; y < ground.height; ++y)
     for (int x = 0; x < ground.width; ++x)
-      ground.texels[static_cast<std::size_t>(y * ground.width + x)] =
-          static_cast<float>(albedo / std::numbers::pi) * sample(light.bare.image(), ground.position(x, y));
+      ground.texels[static_cast<std::size_t>(y * ground.width + x)].head<3>() =
+          static_cast<float>(albedo / std::numbers::pi) * light.on_bare_plane(ground.position(x, y));
   return ground;
 }
 

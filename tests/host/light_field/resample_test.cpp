@@ -105,6 +105,34 @@ TEST(Resample, IrradianceDoesNotDependOnTheNumberOfDirections) {
   EXPECT_NEAR(received[2] / received[1], 1, 0.02);
 }
 
+// A lamp before far surroundings: focused on these, views that pass a ray by some centimetres show the lamp beside
+// where it is. No texel shows that, whatever few views there are.
+TEST(Resample, NoTexelShowsALampThatItsRaysMiss) {
+  const Globe globe;
+  const auto views = testing::analytic_views(120, 0.25F, 96, globe);
+  ResampleOptions options;
+  options.directions = 1000;
+  options.size = 64;
+  options.proxy = "sphere:4";
+  const LightField field = resample(views, square, options, {}).field;
+  ASSERT_EQ(field.emitters.size(), 1U);
+  int beside = 0, lit = 0;
+  for (std::size_t i = 0; i < field.directions.size(); ++i)
+    for (int t = 0; t < 64 * 64; ++t) {
+      const float x = -0.2F + 0.00625F * (static_cast<float>(t % 64) + 0.5F);
+      const float y = 0.2F - 0.00625F * (static_cast<float>(t / 64) + 0.5F);
+      const Eigen::Vector3f to = globe.centre - Eigen::Vector3f(x, y, 0), d = field.directions.directions[i];
+      const float cell = std::sqrt(field.directions.solid_angles_sr[i]);
+      const bool misses = to.dot(d) < 0 || to.cross(d).norm() > 2 * globe.radius + cell * to.norm();
+      const Eigen::Vector4f texel = field.tile(i)[t];
+      if (!misses || texel.w() < 0.1F) continue;
+      ++beside;
+      lit += texel.x() > 0.15F ? 1 : 0;
+    }
+  EXPECT_GT(beside, 1000000);
+  EXPECT_EQ(lit, 0) << "of " << beside;
+}
+
 // Leaves hide a third and more of the lamp in most views, and half of them always on one side.
 TEST(Emitters, ALampBehindLeavesIsFoundWhole) {
   const Globe globe;

@@ -115,6 +115,30 @@ TEST_F(Backends, AgreeOnTheGroundAndOnTheObject) {
             << context_->renderer() << "\n";
 }
 
+// Points of a lamp that hangs beside the spheres: shadows that spread, a mask that is looked up along each line.
+TEST_F(Backends, AgreeOnALampInTheRoom) {
+  const TriangleMesh mesh = two_spheres();
+  const RayScene scene(mesh);
+  std::vector<Eigen::Vector4f> leaf;
+  for (int i = 0; i < 32 * 32; ++i)
+    leaf.emplace_back(Eigen::Vector4f::Constant((i / 4 + i / 128) % 2 == 0 ? 90.F : 60.F));
+  LightSet lights;
+  lights.images = {{{-0.4F, -0.4F}, {0.4F, 0.4F}, 32, 32, leaf.data()}};
+  for (const float x : {0.28F, 0.32F})
+    for (const float y : {0.18F, 0.22F})
+      lights.emitter_points.push_back({{x, y, 0.6F}, {0.3F, 0.2F, 0.6F}, 0.04F, 0.25F, 0});
+  const auto ground = ground_grid(96, 0.3F);
+  const auto cpu = irradiance_cpu(scene, ground, lights, LightSum::blocked);
+  EXPECT_LT(relative_rms(on_gl(mesh, ground, lights, LightSum::blocked), cpu, 0.05), 0.02);
+  double shadow = 0;
+  for (const Eigen::Vector3f& e : cpu) shadow += e.x() > 0 ? 1. / static_cast<double>(cpu.size()) : 0;
+  EXPECT_GT(shadow, 0.05) << "there is a shadow to agree on";
+  const auto points = centroids(mesh);
+  EXPECT_LT(relative_rms(on_gl(mesh, points, lights, LightSum::visible),
+                         irradiance_cpu(scene, points, lights, LightSum::visible), 0.05),
+            0.01);
+}
+
 TEST_F(Backends, GlCastsASingleShadowWhereItShould) {
   const LightField field = test::constant_field(42, 1);
   LightSet lights = make_light_set(field, {0, 1});

@@ -115,25 +115,5 @@ TEST(Importance, TilesHoldWhatTheObjectLooksUp) {
   }
 }
 
-// The emitter is nearer than the surroundings: it counts where the object sees it.
-TEST(Importance, AnEmitterCountsInTheCellsInWhichTheObjectSeesIt) {
-  LightField field = test::constant_field(2500, 0);
-  field.surroundings = sphere_surroundings({0, 0, 0}, 3);
-  field.surroundings.panorama = ImageF(64, 16, 4, 0.01F);
-  ShadedEmitter e;
-  e.emitter = {{0.2F, 0, 0.8F}, 0.05F, 9};
-  e.radiance = Eigen::Vector3f::Constant(500);
-  field.emitters.push_back(e);
-  const Bounds object{{-0.02F, -0.02F, 0.1F}, {0.02F, 0.02F, 0.14F}, {0, 0, 0.12F}, 0.03F};
-  const std::vector<double> light = light_on(field, object);
-  const Eigen::Vector3f towards = (e.emitter.position - object.centre).normalized();
-  double near = 0, far = 0;
-  for (std::size_t i = 0; i < light.size(); ++i)
-    (field.directions.directions[i].dot(towards) > std::cos(0.18F) ? near : far) += light[i];
-  const double distance = static_cast<double>((e.emitter.position - object.centre).norm());
-  EXPECT_NEAR(near, 500 * pi * 0.05 * 0.05 / (distance * distance), 0.05 * near);
-  EXPECT_NEAR(far, 2 * pi * 0.01, 0.1 * far);
-}
-
 }  // namespace
 }  // namespace mf

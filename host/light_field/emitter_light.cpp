@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/light_field/emitter_light.h"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "host/light_field/block_blend.h"
+#include "host/light_field/emitter_blender.h"
+
+namespace mf {
+
+namespace {
+
+// What a ray from the plane's point p (world) receives of the emitter that it meets, through its mask; nothing for rays
+// that meet none, and emitters without a mask.
+std::optional<Eigen::Vector3f> emitted_radiance(std::span<const ShadedEmitter> emitters, const Eigen::Vector3f& p,
+                                                const Eigen::Vector3f& direction) {
+  for (const ShadedEmitter& e : emitters) {
+    if (!e.met_at(p, direction)) continue;
+    const auto visible = e.visibility(p, direction);
+    return visible ? std::optional<Eigen::Vector3f>(*visible * e.radiance) : std::nullopt;
+  }
+  return std::nullopt;
+}
+
+// The emitters' light in one cell, mean over it, at the vertices of the resampler's blocks; empty where it has none.
+class DrawnLight {
+ public:
+  explicit DrawnLight(const LightField& field)
+      : field_(field),
+        world_from_plane_(field.plane.world_from_plane.rotation.toRotationMatrix().cast<float>()),
+        origin_(field.plane.world_from_plane.translation.cast<float>()),
+        step_m_(field.plane.size_m().cast<float>() *
+                (static_cast<float>(vertex_step) / static_cast<float>(field.resolution))),
+        side_((field.resolution + vertex_step - 1) / vertex_step + 1) {}
+
+  [[nodiscard]] std::vector<Eigen::Vector3f> of_cell(std::size_t cell) const {
+    const Eigen::Vector3f direction = world_from_plane_ * field_.directions.directions[cell];
+    const float angle = std::sqrt(field_.directions.solid_angles_sr[cell]);  // no corner is farther from the direction
+    std::vector<Eigen::Vector3f> light;
+    std::vector<CellSample> parts;
+    for (int i = 0; i < side_ * side_; ++i) {
+      const Eigen::Vector3f p = vertex(i % side_, i / side_);
+      if (!may_meet(p, direction, angle)) continue;
+      if (parts.empty()) {
+        light.assign(static_cast<std::size_t>(side_ * side_), Eigen::Vector3f::Zero());
+        parts = split_cell(field_.directions, cell, splits_near_emitter(field_.directions.solid_angles_sr[cell]));
+        for (CellSample& part : parts) part.direction = world_from_plane_ * part.direction;
+      }
+      light[static_cast<std::size_t>(i)] = mean_over(parts, p);
+    }
+    return light;
+  }
+
+  // The tile's texels, less that light.
+  [[nodiscard]] PlaneTile without(std::size_t cell, const std::vector<Eigen::Vector3f>& light) const {
+    const int n = field_.resolution;
+    PlaneTile tile{field_.plane.min_m.cast<float>(), field_.plane.max_m.cast<float>(), n, n, {}};
+    const Eigen::Vector4f* texel = field_.tile(cell);
+    tile.texels.assign(texel, texel + field_.texel_count());
+    for (int y = 0; y < n; ++y)
+      for (int x = 0; x < n; ++x) {
+        Eigen::Vector4f& t = tile.texels[static_cast<std::size_t>(y * n + x)];
+        // A texel's colour is the mean over what was seen of the cell, and its confidence how much that is.
+        if (t.w() > 0) t.head<3>() -= at_texel(light, x, y) / t.w();
+      }
+    return tile;
+  }
+
+ private:
+  // Row 0 at the rectangle's largest y, world frame.
+  [[nodiscard]] Eigen::Vector3f vertex(int x, int y) const {
+    const Eigen::Vector3f in_plane(static_cast<float>(field_.plane.min_m.x()) + static_cast<float>(x) * step_m_.x(),
+                                   static_cast<float>(field_.plane.max_m.y()) - static_cast<float>(y) * step_m_.y(), 0);
+    return origin_ + world_from_plane_ * in_plane;
+  }
+  [[nodiscard]] bool may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle) const {
+    return std::any_of(field_.emitters.begin(), field_.emitters.end(), [&](const ShadedEmitter& e) {
+      const Eigen::Vector3f to = e.emitter.position - p;
+      const float along = to.dot(direction);
+      return along > 0 && to.cross(direction).norm() < e.emitter.radius_m + angle * along;
+    });
+  }
+  [[nodiscard]] Eigen::Vector3f mean_over(const std::vector<CellSample>& parts, const Eigen::Vector3f& p) const {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    float solid_angle = 0;
+    for (const CellSample& part : parts) {
+      solid_angle += part.solid_angle_sr;
+      if (const auto radiance = emitted_radiance(field_.emitters, p, part.direction))
+        sum += part.solid_angle_sr * *radiance;
+    }
+    return sum / solid_angle;
+  }
+  [[nodiscard]] Eigen::Vector3f at_texel(const std::vector<Eigen::Vector3f>& light, int x, int y) const {
+    const int x0 = x / vertex_step, y0 = y / vertex_step;
+    const float fx = (static_cast<float>(x % vertex_step) + 0.5F) / static_cast<float>(vertex_step);
+    const float fy = (static_cast<float>(y % vertex_step) + 0.5F) / static_cast<float>(vertex_step);
+    const Eigen::Vector3f* row = light.data() + static_cast<std::ptrdiff_t>(y0) * side_ + x0;
+    const Eigen::Vector3f* below = row + side_;
+    return (1 - fy) * ((1 - fx) * row[0] + fx * row[1]) + fy * ((1 - fx) * below[0] + fx * below[1]);
+  }
+
+  const LightField& field_;
+  Eigen::Matrix3f world_from_plane_;
+  Eigen::Vector3f origin_;
+  Eigen::Vector2f step_m_;
+  int side_;  // vertices along a side of the tile
+};
+
+}  // namespace
+
+DarkTiles tiles_without_emitters(const LightField& field) {
+  DarkTiles tiles;
+  tiles.images = images_of(field);
+  if (field.emitters.empty()) return tiles;
+  const DrawnLight drawn(field);
+  tiles.changed.resize(field.directions.size());
+  tbb::parallel_for(std::size_t{0}, field.directions.size(), [&](std::size_t i) {
+    const std::vector<Eigen::Vector3f> light = drawn.of_cell(i);
+    if (light.empty()) return;
+    tiles.changed[i] = drawn.without(i, light);
+    tiles.images[i] = tiles.changed[i].image();
+  });
+  return tiles;
+}
+
+}  // namespace mf
