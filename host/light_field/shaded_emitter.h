@@ -32,8 +32,8 @@ struct ShadedEmitter {
   float plane_height_m = 0;                            // h: world z of the plane
   Eigen::Vector2f mask_min_m = Eigen::Vector2f::Zero();
   Eigen::Vector2f mask_max_m = Eigen::Vector2f::Zero();
-  // Three channels: the part of the light that passes (0…1), its weight (up to 1e-4: no view looked there, a guess), the
-  // share. Row 0 at max y.
+  // Three channels: the part of the light that passes (0…1), its weight (up to 1e-4: no view looked there, a guess),
+  // the share. Row 0 at max y.
   ImageF mask;
 
   // Distance from the origin to the ray's point nearest to the centre; nothing when it passes outside `scale` radii.
