@@ -1,7 +1,9 @@
-// Each pixel ranks the photos and blends the k best: Buehler et al. 2001, 4.1, with the weights of
+// A group of 8 x 8 pixels tells which photos could be among the k + 1 best of any; each pixel ranks those and blends its
+// k best: Buehler et al. 2001, 4.1, with the weights of
 // host/blending/view_weights.h. The program's text sets k.
 #include "common_view.glsl"
 #include "common_photos.glsl"
+#include "common_bounds.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(binding = 1) uniform sampler2D surface;  // see common_surface.glsl
@@ -60,17 +62,43 @@ vec4 blend(Ray ray) {
   return vec4(sum / total, sight > least_seen ? 1.0 : guessed);
 }
 
+shared uint worst_bits;  // of the group's (k + 1)-th least penalties so far: floats above 0 are in their bits' order
+shared float bounds[group];
+shared uint near[2];     // a bit for each of the photos that the group looks at: bound below that
+
+// A ray that misses the proxy needs nothing: its worst is 0.
+void rank_all(uint lane, bool meets, Ray ray, Ball ball) {
+  for (int first = 0; first < count.x; first += group) {
+    if (lane == 0u) {
+      worst_bits = 0u;
+      near[0] = near[1] = 0u;
+    }
+    barrier();
+    atomicMax(worst_bits, meets ? floatBitsToUint(least_penalty[k]) : 0u);
+    barrier();
+    int mine = first + int(lane);
+    bounds[lane] = mine < count.x ? bound(speakers[mine], ball) : infinite;
+    if (bounds[lane] < uintBitsToFloat(worst_bits)) atomicOr(near[lane / 32u], 1u << (lane % 32u));
+    barrier();
+    if (meets)
+      for (int word = 0; word < 2; ++word)
+        for (uint left = near[word]; left != 0u; left &= left - 1u) {
+          int at = 32 * word + findLSB(left);
+          if (bounds[at] < least_penalty[k]) rank(first + at, ray);
+        }
+    barrier();
+  }
+}
+
 void main() {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(pixel, size.xy))) return;
-  vec4 met = texelFetch(surface, pixel, 0);
-  vec4 colour = vec4(0.0);
-  if (met.w > 0.0) {
-    vec3 d = in_world(texelFetch(rays, pixel, 0).xy);
-    Ray ray = Ray(d, met.w * d, met.xyz, met.w);
-    clear_ranking();
-    for (int i = 0; i < count.x; ++i) rank(i, ray);
-    colour = blend(ray);
-  }
-  imageStore(picture, pixel, colour);
+  bool in_picture = all(lessThan(pixel, size.xy));
+  vec4 met = in_picture ? texelFetch(surface, pixel, 0) : vec4(0.0);
+  bool meets = met.w > 0.0;
+  vec3 d = meets ? in_world(texelFetch(rays, pixel, 0).xy) : vec3(0.0);
+  Ray ray = Ray(d, met.w * d, met.xyz, met.w);
+  clear_ranking();
+  Ball ball = ball_of_group(gl_LocalInvocationIndex, meets, ray);
+  if (ball.radius >= 0.0) rank_all(gl_LocalInvocationIndex, meets, ray, ball);
+  if (in_picture) imageStore(picture, pixel, meets ? blend(ray) : vec4(0.0));
 }
