@@ -14,6 +14,7 @@
 #include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/session_lumigraph.h"
+#include "host/gl/backend.h"
 #include "host/io/image_file.h"
 #include "host/lumigraph/camera_path.h"
 #include "host/lumigraph/leave_one_out.h"
@@ -266,10 +267,11 @@ void run(LumigraphArguments& a) {
                      "needs a task: give one of --camera-path FILE, --two-plane U,V and --leave-one-out");
   const auto backend = parse_backend(a.backend);
   if (!backend) throw InputError("lumigraph", "--backend", "'" + a.backend + "' is none: use auto, gl or cpu");
+  std::optional<EglContext> context = open_backend(*backend);
   const PhotoSet set = read_photos(a);
   const Lumigraph lumigraph(set, proxy_of(a, set), visibility_of(a), progress_bar());
   check_proxy_is_seen(lumigraph, a);
-  const FrameRenderer renderer(lumigraph, *backend);
+  const FrameRenderer renderer(lumigraph, std::move(context));
   if (a.leave_one_out)
     run_leave_one_out(a, set, renderer, start);
   else if (!a.two_plane.empty())

@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "host/gl/backend.h"
 #include "host/lumigraph/lumigraph_gl.h"
 
 namespace mf {
@@ -14,11 +15,8 @@ struct FrameRenderer::Gl {
   Gl(EglContext&& opened, const Lumigraph& lumigraph) : context(std::move(opened)), frames(context, lumigraph) {}
 };
 
-FrameRenderer::FrameRenderer(const Lumigraph& lumigraph) : FrameRenderer(lumigraph, Backend::cpu) {}
-
-FrameRenderer::FrameRenderer(const Lumigraph& lumigraph, Backend backend) : lumigraph_(&lumigraph) {
-  auto context = open_backend(backend);
-  description_ = describe(context);
+FrameRenderer::FrameRenderer(const Lumigraph& lumigraph, std::optional<EglContext> context)
+    : lumigraph_(&lumigraph), description_(describe(context)) {
   if (context) gl_ = std::make_unique<Gl>(std::move(*context), lumigraph);
 }
 FrameRenderer::FrameRenderer(FrameRenderer&&) noexcept = default;

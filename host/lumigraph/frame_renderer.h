@@ -3,10 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
-#include "host/gl/backend.h"
+#include "host/gl/egl_context.h"
 #include "host/lumigraph/lumigraph.h"
 
 namespace mf {
@@ -15,14 +16,13 @@ namespace mf {
 // and keeps its proxy.
 class FrameRenderer {
  public:
-  // On the CPU, by the lumigraph itself: it is taken wherever a renderer of its frames is.
-  FrameRenderer(const Lumigraph&);
-  // Throws InputError when gl is asked for and OpenGL 4.3 is not to be had, or has no room for the photos.
-  FrameRenderer(const Lumigraph&, Backend);
+  // See open_backend; without a context on the CPU, by the lumigraph itself, which is so taken wherever a renderer of
+  // its frames is. Throws InputError when the card has no room for the photos.
+  FrameRenderer(const Lumigraph&, std::optional<EglContext> = {});
   FrameRenderer(FrameRenderer&&) noexcept;
   ~FrameRenderer();
 
-  // See Lumigraph::render. gl: on the thread that made this.
+  // See Lumigraph::render. gl: on the thread that opened the context.
   [[nodiscard]] LumigraphPicture render(const View&, const LumigraphOptions&,
                                         std::span<const std::uint32_t> views = {}) const;
 

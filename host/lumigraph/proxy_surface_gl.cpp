@@ -74,10 +74,11 @@ std::vector<float> rays_of(const CameraModel& camera) {
 // A pinhole that sees what the camera sees, texel by pixel where it has no distortion.
 CameraModel pinhole_for(const CameraModel& camera) {
   if (!camera.has_distortion()) return camera;
-  constexpr double finer = 2;
+  constexpr double finer = 4;  // at half of it 0.15 % of a picture's pixels were off, at this 0.04 %
+  const int most_texels = std::min(1 << 13, gl_limit(GL_MAX_TEXTURE_SIZE));  // a side: half a gigabyte in all
   const AnsweringCamera limits = answering_camera(camera);
-  const auto texels = [](double extent, double focal) {
-    return std::clamp(static_cast<int>(std::ceil(extent * finer * focal)), 1, gl_limit(GL_MAX_TEXTURE_SIZE));
+  const auto texels = [&](double extent, double focal) {
+    return std::clamp(static_cast<int>(std::ceil(extent * finer * focal)), 1, most_texels);
   };
   const double across = limits.right - limits.left;
   const double down = limits.bottom - limits.top;

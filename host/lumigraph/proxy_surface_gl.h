@@ -16,7 +16,8 @@ inline constexpr GLuint surface_unit = 1;
 // Planes, spheres and boxes are intersected in a compute shader, by the formulas of trace() (proxy_rays.h). Of a mesh
 // the triangles' numbers are drawn first, by a pinhole; the shader then meets the drawn triangle with the pixel's exact
 // ray, and interpolates its normal. For a view without distortion the pinhole is the view's camera, texel by pixel; for
-// one with it, it holds the view's field of view at twice its resolution, so that only outlines may be a pixel off.
+// one with it, it holds the view's field of view at four times its resolution, and the ray meets
+// what was drawn at the four nearest texels, so that only pixels at outlines may differ.
 class GlProxySurface {
  public:
   // A current context is a precondition of everything here; the proxy outlives this. Throws InputError when OpenGL's
