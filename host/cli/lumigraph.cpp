@@ -14,6 +14,7 @@
 #include "common/seconds_since.h"
 #include "host/cli/command.h"
 #include "host/cli/session_lumigraph.h"
+#include "host/gl/backend.h"
 #include "host/io/image_file.h"
 #include "host/lumigraph/camera_path.h"
 #include "host/lumigraph/leave_one_out.h"
@@ -42,6 +43,7 @@ struct LumigraphArguments {
   std::optional<double> st_distance;
   fs::path output;
   bool leave_one_out = false;
+  std::string backend = "cpu";
   bool json = false;
   double scale = 1;
   int k = LumigraphOptions{}.penalty.k;
@@ -123,11 +125,11 @@ Picture difference_of(const Picture& a, const Picture& b, const ImageU8& where) 
       a);
 }
 
-void run_leave_one_out(const LumigraphArguments& a, const PhotoSet& set, const Lumigraph& lumigraph,
+void run_leave_one_out(const LumigraphArguments& a, const PhotoSet& set, const FrameRenderer& renderer,
                        std::chrono::steady_clock::time_point start) {
   if (!a.output.empty()) make_folder(a.output);
   const LeaveOneOut result = leave_one_out(
-      lumigraph, set, options_of(a, set),
+      renderer, set, options_of(a, set),
       [&](const LeftOutView& view, const LeftOutPictures& pictures) {
         if (a.output.empty()) return;
         const fs::path stem = a.output / fs::path(view.name).filename().stem();
@@ -139,7 +141,8 @@ void run_leave_one_out(const LumigraphArguments& a, const PhotoSet& set, const L
   nlohmann::json summary{{"psnr_db", result.psnr_db},
                          {"nearest_view_psnr_db", result.nearest_view_psnr_db},
                          {"ssim", result.ssim},
-                         {"proxy", describe(lumigraph.proxy())},
+                         {"backend", renderer.description()},
+                         {"proxy", describe(renderer.lumigraph().proxy())},
                          {"seconds", seconds_since(start)},
                          {"views", nlohmann::json::array()}};
   std::string text;
@@ -172,18 +175,20 @@ TwoPlane two_plane_of(const LumigraphArguments& a, const PhotoSet& set, const Lu
   return two_plane_from_json(read_json_file(a.two_plane), a.two_plane);
 }
 
-void run_two_plane(const LumigraphArguments& a, const PhotoSet& set, const Lumigraph& lumigraph,
+void run_two_plane(const LumigraphArguments& a, const PhotoSet& set, const FrameRenderer& renderer,
                    std::chrono::steady_clock::time_point start) {
+  const Lumigraph& lumigraph = renderer.lumigraph();
   if (a.output.empty()) throw InputError("lumigraph", "--output", "is missing: name a folder for the light field");
   if (a.st_distance && !(*a.st_distance > 0)) throw InputError("lumigraph", "--st-distance", "must be above 0");
   const TwoPlane planes = two_plane_of(a, set, lumigraph);
-  const TwoPlaneSummary written = write_two_plane(a.output, lumigraph, planes, options_of(a, set), progress_bar());
+  const TwoPlaneSummary written = write_two_plane(a.output, renderer, planes, options_of(a, set), progress_bar());
   const fs::path transforms = a.output / "transforms.json";
   print_summary(
       a.json,
       {{"pictures", written.pictures},
        {"covered", written.covered},
        {"layout", to_json(planes)},
+       {"backend", renderer.description()},
        {"proxy", describe(lumigraph.proxy())},
        {"photos", lumigraph.sources().size()},
        {"transforms", transforms.string()},
@@ -204,8 +209,9 @@ void check_shows_something(const LumigraphPicture& frame, std::size_t number, co
                    "shows nothing that the photos show: move it to where they look, or give another --proxy");
 }
 
-void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const Lumigraph& lumigraph,
+void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const FrameRenderer& renderer,
                      std::chrono::steady_clock::time_point start) {
+  const Lumigraph& lumigraph = renderer.lumigraph();
   if (a.output.empty()) throw InputError("lumigraph", "--output", "is missing: name a folder for the frames");
   const std::vector<View> views = read_camera_path(a.camera_path);
   const std::vector<double> times = a.time ? std::vector<double>{} : read_path_times(a.camera_path);
@@ -217,7 +223,7 @@ void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const Lum
     report_progress(progress, "frames", static_cast<double>(i) / static_cast<double>(views.size()));
     const auto before = std::chrono::steady_clock::now();
     if (!times.empty()) options.moment->time_s = times[i];
-    const LumigraphPicture frame = lumigraph.render(views[i], options);
+    const LumigraphPicture frame = renderer.render(views[i], options);
     render_s += seconds_since(before);
     check_shows_something(frame, i, a);
     make_folder(a.output);
@@ -229,6 +235,7 @@ void run_camera_path(const LumigraphArguments& a, const PhotoSet& set, const Lum
   print_summary(a.json,
                 {{"frames", views.size()},
                  {"frames_per_second", per_second},
+                 {"backend", renderer.description()},
                  {"proxy", describe(lumigraph.proxy())},
                  {"photos", lumigraph.sources().size()},
                  {"pictures", pattern},
@@ -258,15 +265,19 @@ void run(LumigraphArguments& a) {
   if ((a.leave_one_out ? 1 : 0) + (a.camera_path.empty() ? 0 : 1) + (a.two_plane.empty() ? 0 : 1) != 1)
     throw InputError("lumigraph", "",
                      "needs a task: give one of --camera-path FILE, --two-plane U,V and --leave-one-out");
+  const auto backend = parse_backend(a.backend);
+  if (!backend) throw InputError("lumigraph", "--backend", "'" + a.backend + "' is none: use auto, gl or cpu");
+  std::optional<EglContext> context = open_backend(*backend);
   const PhotoSet set = read_photos(a);
   const Lumigraph lumigraph(set, proxy_of(a, set), visibility_of(a), progress_bar());
   check_proxy_is_seen(lumigraph, a);
+  const FrameRenderer renderer(lumigraph, std::move(context));
   if (a.leave_one_out)
-    run_leave_one_out(a, set, lumigraph, start);
+    run_leave_one_out(a, set, renderer, start);
   else if (!a.two_plane.empty())
-    run_two_plane(a, set, lumigraph, start);
+    run_two_plane(a, set, renderer, start);
   else
-    run_camera_path(a, set, lumigraph, start);
+    run_camera_path(a, set, renderer, start);
 }
 
 }  // namespace
@@ -294,6 +305,7 @@ void add_lumigraph_command(CommandLine& program) {
   command.option("--st-distance", a->st_distance,
                  "with --two-plane U,V: metres between the planes (default: where the proxy is)");
   command.option("-o,--output", a->output, "folder for the pictures");
+  command.option("--backend", a->backend, "cpu (default), gl, or auto: gl on a graphics card, else cpu");
   command.option("-k", a->k, "photos that speak for a ray");
   command.option("--angle", a->angle, "α: penalty per radian between the wanted ray and the photo's");
   command.option("--resolution", a->resolution, "β: penalty per octave by which the photo is coarser than wanted");

@@ -54,8 +54,12 @@ GlVertexArray make_vertex_array() {
 
 namespace {
 
-void attach(const GlProgram& program, GLenum kind, std::string_view name) {
-  const std::string source = shader_source(name);
+void attach(const GlProgram& program, GLenum kind, std::string_view name,
+            std::span<const ShaderConstant> constants = {}) {
+  std::string source = shader_source(name);
+  const std::size_t after_version = source.find('\n') + 1;
+  for (const ShaderConstant& constant : constants)
+    source.insert(after_version, fmt::format("const int {} = {};\n", constant.name, constant.value));
   const char* text = source.c_str();
   const GLuint shader = glCreateShader(kind);
   glShaderSource(shader, 1, &text, nullptr);
@@ -71,12 +75,7 @@ void attach(const GlProgram& program, GLenum kind, std::string_view name) {
   check(compiled == GL_TRUE, fmt::format("{} compiles: {}", name, log));
 }
 
-}  // namespace
-
-GlProgram make_program(std::string_view vertex, std::string_view fragment) {
-  GlProgram program(glCreateProgram());
-  attach(program, GL_VERTEX_SHADER, vertex);
-  attach(program, GL_FRAGMENT_SHADER, fragment);
+void link(const GlProgram& program, std::string_view what) {
   glLinkProgram(program.name());
   GLint linked = 0;
   glGetProgramiv(program.name(), GL_LINK_STATUS, &linked);
@@ -84,8 +83,30 @@ GlProgram make_program(std::string_view vertex, std::string_view fragment) {
   GLsizei length = 0;
   glGetProgramInfoLog(program.name(), static_cast<GLsizei>(log.size()), &length, log.data());
   log.resize(static_cast<std::size_t>(length));
-  check(linked == GL_TRUE, fmt::format("{} and {} link: {}", vertex, fragment, log));
+  check(linked == GL_TRUE, fmt::format("{} link: {}", what, log));
+}
+
+}  // namespace
+
+GlProgram make_program(std::string_view vertex, std::string_view fragment) {
+  GlProgram program(glCreateProgram());
+  attach(program, GL_VERTEX_SHADER, vertex);
+  attach(program, GL_FRAGMENT_SHADER, fragment);
+  link(program, fmt::format("{} and {}", vertex, fragment));
   return program;
+}
+
+GlProgram make_compute_program(std::string_view compute, std::span<const ShaderConstant> constants) {
+  GlProgram program(glCreateProgram());
+  attach(program, GL_COMPUTE_SHADER, compute, constants);
+  link(program, compute);
+  return program;
+}
+
+GLint gl_limit(GLenum name) {
+  GLint value = 0;
+  glGetIntegerv(name, &value);
+  return value;
 }
 
 void check_gl(std::string_view what) {

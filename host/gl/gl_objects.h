@@ -3,6 +3,7 @@
 
 #include <epoxy/gl.h>
 
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -52,6 +53,15 @@ using GlProgram = GlObject<gl_delete::program>;
 // From the sources named `vertex` and `fragment` in shaders/ (see shader_source). A fault in them is a bug of ours: the
 // driver's message is in the std::logic_error.
 [[nodiscard]] GlProgram make_program(std::string_view vertex, std::string_view fragment);
+
+// A length of an array or the like that a shader's text needs: `const int NAME = VALUE;` before its first line of code.
+struct ShaderConstant {
+  std::string_view name;
+  int value = 0;
+};
+[[nodiscard]] GlProgram make_compute_program(std::string_view compute, std::span<const ShaderConstant> constants = {});
+
+[[nodiscard]] GLint gl_limit(GLenum name);
 
 // Throws std::logic_error naming `what` when OpenGL has reported an error since the last call.
 void check_gl(std::string_view what);

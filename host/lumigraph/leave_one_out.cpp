@@ -128,9 +128,9 @@ void leave_to_mask(const ImageU8& mask, ImageU8& covered) {
 
 }  // namespace
 
-LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const LumigraphOptions& options,
+LeaveOneOut leave_one_out(const FrameRenderer& renderer, const PhotoSet& set, const LumigraphOptions& options,
                           const TakeLeftOut& take, const Progress& progress) {
-  const auto& sources = lumigraph.sources();
+  const auto& sources = renderer.lumigraph().sources();
   check(sources.size() >= 2 && sources.size() == set.photos.size(), "a photo is left out of two or more");
   LumigraphOptions blended = options;
   LumigraphOptions alone = options;
@@ -144,9 +144,9 @@ LeaveOneOut leave_one_out(const Lumigraph& lumigraph, const PhotoSet& set, const
       if (j != i) others.push_back(j);
     const View view{sources[i].camera, sources[i].cam_from_world};
     if (blended.moment && sources[i].time_s) blended.moment->time_s = *sources[i].time_s;
-    LumigraphPicture foretold = lumigraph.render(view, blended, others);
+    LumigraphPicture foretold = renderer.render(view, blended, others);
     const std::uint32_t nearest = nearest_to(sources, i);
-    LumigraphPicture by_nearest = lumigraph.render(view, alone, {&nearest, 1});
+    LumigraphPicture by_nearest = renderer.render(view, alone, {&nearest, 1});
     leave_to_mask(set.photos[i].mask, foretold.covered);
     leave_to_mask(set.photos[i].mask, by_nearest.covered);
     const Picture& photo = set.photos[i].picture;

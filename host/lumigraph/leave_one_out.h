@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/progress.h"
-#include "host/lumigraph/lumigraph.h"
+#include "host/lumigraph/frame_renderer.h"
 
 namespace mf {
 
@@ -35,7 +35,7 @@ using TakeLeftOut = std::function<void(const LeftOutView&, const LeftOutPictures
 // PSNR = −10 log₁₀ of the mean squared difference of all channels, 8-bit codes as 0…1; linear pictures relative to
 // their photo's largest value. Where the options have a moment, each photo is foretold for its own. `take` gets each
 // result as it comes; may be empty.
-[[nodiscard]] LeaveOneOut leave_one_out(const Lumigraph&, const PhotoSet&, const LumigraphOptions&,
+[[nodiscard]] LeaveOneOut leave_one_out(const FrameRenderer&, const PhotoSet&, const LumigraphOptions&,
                                         const TakeLeftOut& = {}, const Progress& = {});
 
 // The same for two pictures of one size, over the pixels that are seen.

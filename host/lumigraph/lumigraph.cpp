@@ -75,6 +75,12 @@ void blend_colours(const ChosenViews& chosen, ImageU8& picture, ImageU8& covered
   });
 }
 
+ViewTable table_of(const FrameInput& input) {
+  ViewTable table;
+  for (const std::uint32_t number : input.speaking) table.add(number, input.views[number]);
+  return table;
+}
+
 void render_tiles(const TileFrame& frame, const TakeChosen& take, TilePool& pool) {
   const int columns = (frame.view.camera.width + tile_side - 1) / tile_side;
   const int rows = (frame.view.camera.height + tile_side - 1) / tile_side;
@@ -140,35 +146,34 @@ std::vector<AnsweringView> Lumigraph::views_from(const Eigen::Vector3d& eye, con
   return views;
 }
 
-ViewTable Lumigraph::speaking(std::span<const std::uint32_t> views, std::span<const AnsweringView> answering) const {
-  std::vector<std::uint32_t> all(views.begin(), views.end());
-  if (all.empty()) {
-    all.resize(sources_.size());
-    std::iota(all.begin(), all.end(), 0U);
-  }
-  ViewTable speaking;
-  for (const std::uint32_t view : all) {
-    check(view < sources_.size(), "a photo that may speak is one of the set");
-    speaking.add(view, answering[view]);
-  }
-  return speaking;
-}
-
-WantedResolution Lumigraph::resolution_of(const View& view, const ViewTable& speaking) const {
+WantedResolution Lumigraph::resolution_of(const View& view, std::span<const std::uint32_t> speaking) const {
   float finest = 0;
-  for (const std::uint32_t number : speaking.numbers())
-    finest = std::max(finest, cameras_[number].fx * cameras_[number].fy);
+  for (const std::uint32_t number : speaking) finest = std::max(finest, cameras_[number].fx * cameras_[number].fy);
   const auto focal2 = static_cast<float>(view.camera.fx() * view.camera.fy());
   return {std::min(focal2, finest), 0.5F * std::log2(std::max(focal2 / finest, 1.0F))};
 }
 
+FrameInput Lumigraph::frame_input(const View& view, const LumigraphOptions& options,
+                                  std::span<const std::uint32_t> views) const {
+  check(!options.validate(), "the lumigraph's options are valid");
+  FrameInput input;
+  input.speaking.assign(views.begin(), views.end());
+  if (views.empty()) {
+    input.speaking.resize(sources_.size());
+    std::iota(input.speaking.begin(), input.speaking.end(), 0U);
+  }
+  for (const std::uint32_t number : input.speaking)
+    check(number < sources_.size(), "a photo that may speak is one of the set");
+  input.views = views_from(view.cam_from_world.inverse().translation, options);
+  input.wanted = resolution_of(view, input.speaking);
+  return input;
+}
+
 LumigraphPicture Lumigraph::render(const View& view, const LumigraphOptions& options,
                                    std::span<const std::uint32_t> views) const {
-  check(!options.validate(), "the lumigraph's options are valid");
-  const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
-  const ViewTable may_speak = speaking(views, answering);
-  const TileFrame frame{
-      view, proxy_, options, visibility_.tolerance, answering, may_speak, resolution_of(view, may_speak)};
+  const FrameInput input = frame_input(view, options, views);
+  const ViewTable may_speak = table_of(input);
+  const TileFrame frame{view, proxy_, options, visibility_.tolerance, input.views, may_speak, input.wanted};
   const int width = view.camera.width;
   const int height = view.camera.height;
   LumigraphPicture result{ImageU8(), ImageU8(width, height, 1)};
@@ -194,8 +199,8 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
                                               const LumigraphOptions& options,
                                               std::span<const std::uint32_t> views) const {
   const View one = pixel_of_view(view, pixel);
-  const std::vector<AnsweringView> answering = views_from(view.cam_from_world.inverse().translation, options);
-  const ViewTable may_speak = speaking(views, answering);
+  const FrameInput input = frame_input(view, options, views);
+  const ViewTable may_speak = table_of(input);
   std::vector<ViewWeight> weights;
   const TakeChosen take = [&](const ChosenViews& chosen) {
     if (chosen.pixel[0] < 0) return;
@@ -203,8 +208,7 @@ std::vector<ViewWeight> Lumigraph::weights_at(const View& view, const Eigen::Vec
       if (const std::size_t at = row * chosen.pixel.size(); chosen.weight[at] > 0)
         weights.push_back({chosen.view[static_cast<std::size_t>(chosen.candidate[at])], chosen.weight[at]});
   };
-  const TileFrame frame{
-      one, proxy_, options, visibility_.tolerance, answering, may_speak, resolution_of(view, may_speak)};
+  const TileFrame frame{one, proxy_, options, visibility_.tolerance, input.views, may_speak, input.wanted};
   TileRenderer(frame, pool_->local(), take).render(0, 0);
   return weights;
 }

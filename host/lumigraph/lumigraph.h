@@ -21,9 +21,7 @@
 
 namespace mf {
 
-struct WantedResolution;
 class TilePool;
-class ViewTable;
 
 // What a picture of the lumigraph shows: the place, or which photo speaks for what, each in a colour of its own (the
 // blending field of Buehler et al. 2001, figure 6).
@@ -47,6 +45,19 @@ enum Covered : std::uint8_t { nothing = 0, guessed = 127, seen = 255 };
 struct LumigraphPicture {
   Picture picture;  // black where nothing is covered; the blending field is 8-bit always
   ImageU8 covered;  // see Covered
+};
+
+// See RayBundle.
+struct WantedResolution {
+  float focal2 = 1;
+  float beyond = 0;
+};
+
+// What a frame is made from, whoever makes it.
+struct FrameInput {
+  std::vector<std::uint32_t> speaking;  // the photos that may speak
+  std::vector<AnsweringView> views;     // every photo, for this frame's eye
+  WantedResolution wanted;
 };
 
 // New views of a place from posed photos and a rough idea of its shape: unstructured lumigraph rendering (Buehler,
@@ -89,11 +100,18 @@ class Lumigraph {
   [[nodiscard]] const std::vector<Source>& sources() const { return sources_; }
   [[nodiscard]] const Proxy& proxy() const { return proxy_; }
 
+  // What another back end draws with: see GlLumigraph.
+  [[nodiscard]] const std::vector<AnsweringCamera>& cameras() const { return cameras_; }
+  [[nodiscard]] const PhotoPyramids& pyramids() const { return pyramids_; }
+  [[nodiscard]] const std::vector<SourceSight>& sights() const { return sights_; }
+  [[nodiscard]] const VisibilityOptions& visibility() const { return visibility_; }
+  [[nodiscard]] FrameInput frame_input(const View&, const LumigraphOptions&,
+                                       std::span<const std::uint32_t> views) const;
+
  private:
   void look_at_proxy(const Progress&);
   [[nodiscard]] std::vector<AnsweringView> views_from(const Eigen::Vector3d& eye, const LumigraphOptions&) const;
-  [[nodiscard]] ViewTable speaking(std::span<const std::uint32_t> views, std::span<const AnsweringView>) const;
-  [[nodiscard]] WantedResolution resolution_of(const View&, const ViewTable& speaking) const;
+  [[nodiscard]] WantedResolution resolution_of(const View&, std::span<const std::uint32_t> speaking) const;
 
   std::vector<Source> sources_;
   std::vector<AnsweringCamera> cameras_;

@@ -35,7 +35,23 @@ inline Float4 load_four(const std::uint8_t* values) {
 template <typename T>
 class PhotoPyramid {
  public:
+  struct Level {
+    float scale_x = 1;  // level pixels for each pixel of the photo
+    float scale_y = 1;
+    int width = 0;
+    int height = 0;
+    std::vector<T> texels;  // four a pixel
+
+    [[nodiscard]] const T* texel(int x, int y) const {
+      return texels.data() +
+             4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+    }
+    [[nodiscard]] Float4 at(int x, int y) const { return load_four(texel(x, y)); }
+  };
+
   explicit PhotoPyramid(const Image<T>& photo);
+
+  [[nodiscard]] const std::vector<Level>& levels() const { return levels_; }  // the finest first, the last 1 × 1
 
   // The photo at pixel position (x, y) of its full size, filtered to texels of 2^lod pixels, lod ≥ 0: bilinear in two
   // levels and linear between them. Positions outside are moved to the border.
@@ -50,20 +66,6 @@ class PhotoPyramid {
 
  private:
   static constexpr float negligible_lod = 1e-3F;  // changes a colour by less than a thousandth of a level's detail
-
-  struct Level {
-    float scale_x = 1;  // level pixels for each pixel of the photo
-    float scale_y = 1;
-    int width = 0;
-    int height = 0;
-    std::vector<T> texels;  // four a pixel
-
-    [[nodiscard]] const T* texel(int x, int y) const {
-      return texels.data() +
-             4 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
-    }
-    [[nodiscard]] Float4 at(int x, int y) const { return load_four(texel(x, y)); }
-  };
 
   [[nodiscard]] static Float4 bilinear(const Level& level, float x, float y) {
     const float u = std::clamp(x * level.scale_x - 0.5F, 0.0F, static_cast<float>(level.width - 1));

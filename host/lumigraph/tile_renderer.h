@@ -29,12 +29,6 @@ using TakeChosen = std::function<void(const ChosenViews&)>;
 
 inline constexpr int tile_side = 64;  // pixels
 
-// See RayBundle.
-struct WantedResolution {
-  float focal2 = 1;
-  float beyond = 0;
-};
-
 // Rays of the new view, one value each, and what they meet: see RayBundle.
 struct TileRays {
   std::vector<float> dx, dy, dz, depth, nx, ny, nz;

@@ -243,7 +243,7 @@ TwoPlane two_plane_from_json(const json& layout, const std::string& file) {
   return planes;
 }
 
-TwoPlaneSummary write_two_plane(const fs::path& folder, const Lumigraph& lumigraph, const TwoPlane& planes,
+TwoPlaneSummary write_two_plane(const fs::path& folder, const FrameRenderer& renderer, const TwoPlane& planes,
                                 const LumigraphOptions& options, const Progress& progress) {
   check(!planes.validate(), "the two planes are valid");
   make_folder(folder);
@@ -254,7 +254,7 @@ TwoPlaneSummary write_two_plane(const fs::path& folder, const Lumigraph& lumigra
   for (int i = 0; i < count; ++i) {
     report_progress(progress, "two-plane pictures", static_cast<double>(i) / count);
     const View view = grid_view(planes, i % planes.cameras[0], i / planes.cameras[0]);
-    const LumigraphPicture shown = lumigraph.render(view, options);
+    const LumigraphPicture shown = renderer.render(view, options);
     const std::string name = fmt::format("{:02}_{:02}", i / planes.cameras[0], i % planes.cameras[0]);
     json entry = frame_entry(view, write_picture(folder / name, shown.picture).filename().string());
     ImageU8 mask = shown.covered;

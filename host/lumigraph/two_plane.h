@@ -12,7 +12,7 @@
 #include "common/progress.h"
 #include "common/rigid3.h"
 #include "host/io/view.h"
-#include "host/lumigraph/lumigraph.h"
+#include "host/lumigraph/frame_renderer.h"
 
 namespace mf {
 
@@ -59,7 +59,7 @@ struct TwoPlaneSummary {
 // Renders every picture of the grid into `folder`, which is made: VV_UU.png or .exr (row, column), VV_UU_mask.png where
 // a picture is not covered all over, two_plane.json (the layout), and transforms.json, last, which names them all.
 // Throws InputError naming the file, or when no picture shows anything.
-TwoPlaneSummary write_two_plane(const std::filesystem::path& folder, const Lumigraph&, const TwoPlane&,
+TwoPlaneSummary write_two_plane(const std::filesystem::path& folder, const FrameRenderer&, const TwoPlane&,
                                 const LumigraphOptions&, const Progress&);
 
 }  // namespace mf

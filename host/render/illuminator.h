@@ -2,17 +2,12 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
-#include <string_view>
 
+#include "host/gl/backend.h"
 #include "host/render/irradiance.h"
 
 namespace mf {
-
-// How visibility is found. automatic: gl on a graphics card; cpu where OpenGL is missing or itself runs on the CPU.
-enum class Backend { automatic, gl, cpu };
-[[nodiscard]] std::optional<Backend> parse_backend(std::string_view name);  // "auto", "gl", "cpu"
 
 // One mesh, lit by whichever back end was chosen. `mesh` and `scene` are the same surface and outlive it.
 class Illuminator {

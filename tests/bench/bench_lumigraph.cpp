@@ -13,6 +13,7 @@
 
 #include "host/io/image_file.h"
 #include "host/lumigraph/leave_one_out.h"
+#include "host/lumigraph/lumigraph_gl.h"
 #include "host/lumigraph/read_photos.h"
 #include "tests/bench/vertex_field.h"
 #include "tests/host/lumigraph/made_photos.h"
@@ -44,19 +45,20 @@ std::shared_ptr<const Lumigraph> lumigraph_of(int photos, int size_px, bool mesh
   return lumigraph;
 }
 
-// Arguments: photos, their size, k, mesh or plane. A new view of 512² on a circle through the cap.
+// A new view of 512² on a circle through the cap.
+View around_the_cap(int i) {
+  const double angle = 0.1 * i;
+  return {test::pinhole(512, 45), test::looking({1.8 * std::cos(angle), 1.8 * std::sin(angle), 3.2}, {0, 0, -0.1})};
+}
+
+// Arguments: photos, their size, k, mesh or plane.
 void frames(benchmark::State& state) {
   const auto lumigraph =
       lumigraph_of(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)), state.range(3) != 0);
   LumigraphOptions options;
   options.penalty.k = static_cast<int>(state.range(2));
   int i = 0;
-  for (auto _ : state) {
-    const double angle = 0.1 * i++;
-    const View view{test::pinhole(512, 45),
-                    test::looking({1.8 * std::cos(angle), 1.8 * std::sin(angle), 3.2}, {0, 0, -0.1})};
-    benchmark::DoNotOptimize(lumigraph->render(view, options));
-  }
+  for (auto _ : state) benchmark::DoNotOptimize(lumigraph->render(around_the_cap(i++), options));
   state.counters["fps"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 BENCHMARK(frames)
@@ -71,6 +73,36 @@ BENCHMARK(frames)
     ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Iterations(40);
+
+// The same frames by OpenGL, on whatever there is: its name is the label.
+void frames_on_gl(benchmark::State& state) {
+  auto opened = EglContext::open();
+  if (const auto* missing = std::get_if<GlUnavailable>(&opened)) {
+    state.SkipWithError(("no OpenGL: " + missing->reason).c_str());
+    return;
+  }
+  auto& context = std::get<EglContext>(opened);
+  state.SetLabel(context.renderer());
+  const auto lumigraph =
+      lumigraph_of(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)), state.range(3) != 0);
+  const GlLumigraph on_gl(context, *lumigraph);
+  LumigraphOptions options;
+  options.penalty.k = static_cast<int>(state.range(2));
+  benchmark::DoNotOptimize(on_gl.render(around_the_cap(0), options));  // the driver compiles its shaders
+  int i = 0;
+  for (auto _ : state) benchmark::DoNotOptimize(on_gl.render(around_the_cap(i++), options));
+  state.counters["fps"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+BENCHMARK(frames_on_gl)
+    ->ArgNames({"photos", "size", "k", "mesh"})
+    ->Args({200, 512, 4, 1})
+    ->Args({200, 512, 4, 0})
+    ->Args({50, 256, 4, 1})
+    ->Args({1000, 256, 4, 1})
+    ->Unit(benchmark::kMillisecond)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Iterations(10);
 
 // A corridor 2 m wide and 1.5 m high, photos along it that look ahead, and a new view between them: what is ahead was
 // seen finely by the photos further on, what is beside it only by those behind.
