@@ -2,10 +2,12 @@
 // The two back ends make one picture: each is the other's reference. Skipped (77) where there is no OpenGL.
 #include "host/lumigraph/lumigraph_gl.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <variant>
 
@@ -106,12 +108,13 @@ class LumigraphOnGl : public testing::Test {
     EXPECT_GT(d.psnr_db, 45) << proxy;
     EXPECT_LE(d.off, outlines) << proxy;
     EXPECT_LE(d.uncovered, outlines) << proxy;
-    RecordProperty("psnr_db", std::to_string(d.psnr_db));
-    RecordProperty("off", std::to_string(d.off));
-    RecordProperty("uncovered", std::to_string(d.uncovered));
+    RecordProperty(fmt::format("comparison_{}", ++comparisons_),
+                   fmt::format("{}: {:.1f} dB, {:.3f} % off, {:.3f} % covered otherwise", proxy, d.psnr_db, 100 * d.off,
+                               100 * d.uncovered));
   }
 
   std::optional<EglContext> context_;
+  int comparisons_ = 0;
 };
 
 constexpr double rounding = 2e-4;  // of the pixels: a photo at the threshold, on one side of it or the other
