@@ -26,7 +26,8 @@ const Names vocabulary{"Eigen", "fmt", "JSON", "TOML"};
 const Names stage_libraries = vocabulary + Names{"TBB"};
 // The plain structs that stages hand forward.
 const Names records{"host/calibration/calibration.h", "host/light_field/light_field.h",
-                    "host/light_field/direction_set.h", "host/light_field/light_tiles.h"};
+                    "host/light_field/direction_set.h", "host/light_field/light_tiles.h",
+                    "host/light_field/emitter_light.h"};
 const Names stage_headers = Names{"common/", "host/io/", "host/gl/", "host/blending/", "host/tracing/", "host/team/"};
 
 bool starts_with_any(std::string_view text, const Names& beginnings) {
