@@ -45,7 +45,7 @@ class PlaneTiles {
   std::vector<Wanted> wanted_;
 
   std::vector<float> bounds_;
-  LeastPenalties ranking_;
+  ViewRanking ranking_;
   // Of the block at hand:
   const RectifiedViews::Block* block_ = nullptr;
   Eigen::Vector3f corner_;                 // the centre of its first texel

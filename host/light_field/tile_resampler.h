@@ -113,7 +113,7 @@ class TileResampler {
   Lookers lookers_;
   std::vector<float> bounds_;
   std::vector<Look> looks_;  // by looker, of those whose penalty is asked for
-  LeastPenalties ranking_;
+  ViewRanking ranking_;
   std::vector<std::vector<std::uint32_t>> best_lookers_;  // by block corner
   std::vector<float> reach_m_;                            // by block corner: how far the farthest of them pass
   std::vector<std::uint32_t> candidates_;                 // lookers, of the block at hand

@@ -17,7 +17,7 @@ namespace mf {
 // The `wanted` least of many penalties, without ordering all of them: only those below a bound are looked at, which is
 // widened until enough are. Neighbouring rays have similar bounds, so the last one is where the next search begins;
 // what is found does not depend on it.
-class LeastPenalties {
+class ViewRanking {
  public:
   // `lower_bound[i]` ≤ the penalty of view i, which `penalty_of(i)` computes (infinite: it has no say). The result is
   // valid until the next call; in no order. `announce(i)` comes for each of some views before their penalties are asked

@@ -73,10 +73,10 @@ TEST(BlockBlend, PenaltiesAreThoseOfTheRays) {
   }
 }
 
-TEST(LeastPenalties, FindsTheLeastWhateverItLookedForBefore) {
+TEST(ViewRanking, FindsTheLeastWhateverItLookedForBefore) {
   std::mt19937 random(11);
   std::uniform_real_distribution<float> uniform(0, 1);
-  LeastPenalties search;
+  ViewRanking search;
   for (int round = 0; round < 200; ++round) {
     const float scale = std::pow(10.0F, 12 * uniform(random) - 6);
     std::vector<float> bounds, penalties;
