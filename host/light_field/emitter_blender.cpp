@@ -85,14 +85,6 @@ std::uint32_t EmitterBlender::concerned(const Eigen::Vector3f& p, const Eigen::V
   return found == emitters_.end() ? 0 : 1 + static_cast<std::uint32_t>(found - emitters_.begin());
 }
 
-bool EmitterBlender::may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const {
-  return std::any_of(emitters_.begin(), emitters_.end(), [&](const ShadedEmitter& s) {
-    const Eigen::Vector3f to = s.emitter.position - p;
-    const float along = to.dot(direction);
-    return along > 0 && to.cross(direction).norm() < s.emitter.radius_m + angle_rad * along;
-  });
-}
-
 bool EmitterBlender::shown_by(const FieldView& view, const ProxyPoint& x, float angle_rad) const {
   if (emitters_.empty()) return false;
   const Eigen::Vector3f ray = ray_to(x, view.centre_in_world);
@@ -104,12 +96,6 @@ bool EmitterBlender::shown_by(const FieldView& view, const ProxyPoint& x, float 
     const float reach = ghost_margin * s.emitter.radius_m + angle_rad / length * along;
     return along > 0 && to.squaredNorm() - along * along < reach * reach;
   });
-}
-
-const ShadedEmitter* EmitterBlender::met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
-  for (const ShadedEmitter& s : emitters_)
-    if (s.met_at(p, direction)) return &s;
-  return nullptr;
 }
 
 Eigen::Vector4f EmitterBlender::radiance(const ShadedEmitter* met, const Eigen::Vector3f& p,

@@ -45,18 +45,12 @@ class EmitterBlender {
     return concerned(p, direction, angle_rad) != 0;
   }
 
-  // Whether rays within `angle_rad` of the direction may meet one.
-  [[nodiscard]] bool may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle_rad) const;
-
   // Whether what a view shows of the proxy point, over `angle_rad` as seen from the plane, has an emitter or its glare
   // in it. For a ray that meets none such a view says nothing.
   [[nodiscard]] bool shown_by(const FieldView&, const ProxyPoint&, float angle_rad) const;
 
-  // The emitter that a ray meets, hidden or not; null when it meets none.
-  [[nodiscard]] const ShadedEmitter* met(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
-
-  // Blended colour and weight of one ray with a footprint of `angle_rad`. `met`: the emitter it meets. Only
-  // `candidates` are asked (indices of views).
+  // Blended colour and weight of one ray with a footprint of `angle_rad`. `met`: the emitter that it meets
+  // (emitter_met). Only `candidates` are asked (indices of views).
   [[nodiscard]] Eigen::Vector4f radiance(const ShadedEmitter* met, const Eigen::Vector3f& p,
                                          const Eigen::Vector3f& direction, float angle_rad,
                                          std::span<const std::uint32_t> candidates) const;

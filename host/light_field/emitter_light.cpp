@@ -6,27 +6,14 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <span>
 
 #include "host/light_field/block_blend.h"
 #include "host/light_field/emitter_blender.h"
+#include "host/light_field/rectified_views.h"
 
 namespace mf {
 
 namespace {
-
-// What a ray from the plane's point p (world) receives of the emitter that it meets, through its mask; nothing for rays
-// that meet none, and emitters without a mask.
-std::optional<Eigen::Vector3f> emitted_radiance(std::span<const ShadedEmitter> emitters, const Eigen::Vector3f& p,
-                                                const Eigen::Vector3f& direction) {
-  for (const ShadedEmitter& e : emitters) {
-    if (!e.met_at(p, direction)) continue;
-    const auto visible = e.visibility(p, direction);
-    return visible ? std::optional<Eigen::Vector3f>(*visible * e.radiance) : std::nullopt;
-  }
-  return std::nullopt;
-}
 
 // The emitters' light in one cell, mean over it, at the vertices of the resampler's blocks; empty where it has none.
 class DrawnLight {
@@ -34,9 +21,7 @@ class DrawnLight {
   explicit DrawnLight(const LightField& field)
       : field_(field),
         world_from_plane_(field.plane.world_from_plane.rotation.toRotationMatrix().cast<float>()),
-        origin_(field.plane.world_from_plane.translation.cast<float>()),
-        step_m_(field.plane.size_m().cast<float>() *
-                (static_cast<float>(vertex_step) / static_cast<float>(field.resolution))),
+        grid_(field.plane, field.resolution),
         side_((field.resolution + vertex_step - 1) / vertex_step + 1) {}
 
   [[nodiscard]] std::vector<Eigen::Vector3f> of_cell(std::size_t cell) const {
@@ -45,8 +30,9 @@ class DrawnLight {
     std::vector<Eigen::Vector3f> light;
     std::vector<CellSample> parts;
     for (int i = 0; i < side_ * side_; ++i) {
-      const Eigen::Vector3f p = vertex(i % side_, i / side_);
-      if (!may_meet(p, direction, angle)) continue;
+      const Eigen::Vector3f p =
+          grid_.at(static_cast<float>(i % side_ * vertex_step), static_cast<float>(i / side_ * vertex_step));
+      if (!may_meet_emitter(field_.emitters, p, direction, angle)) continue;
       if (parts.empty()) {
         light.assign(static_cast<std::size_t>(side_ * side_), Eigen::Vector3f::Zero());
         parts = split_cell(field_.directions, cell, splits_near_emitter(field_.directions.solid_angles_sr[cell]));
@@ -73,26 +59,15 @@ class DrawnLight {
   }
 
  private:
-  // Row 0 at the rectangle's largest y, world frame.
-  [[nodiscard]] Eigen::Vector3f vertex(int x, int y) const {
-    const Eigen::Vector3f in_plane(static_cast<float>(field_.plane.min_m.x()) + static_cast<float>(x) * step_m_.x(),
-                                   static_cast<float>(field_.plane.max_m.y()) - static_cast<float>(y) * step_m_.y(), 0);
-    return origin_ + world_from_plane_ * in_plane;
-  }
-  [[nodiscard]] bool may_meet(const Eigen::Vector3f& p, const Eigen::Vector3f& direction, float angle) const {
-    return std::any_of(field_.emitters.begin(), field_.emitters.end(), [&](const ShadedEmitter& e) {
-      const Eigen::Vector3f to = e.emitter.position - p;
-      const float along = to.dot(direction);
-      return along > 0 && to.cross(direction).norm() < e.emitter.radius_m + angle * along;
-    });
-  }
   [[nodiscard]] Eigen::Vector3f mean_over(const std::vector<CellSample>& parts, const Eigen::Vector3f& p) const {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     float solid_angle = 0;
     for (const CellSample& part : parts) {
       solid_angle += part.solid_angle_sr;
-      if (const auto radiance = emitted_radiance(field_.emitters, p, part.direction))
-        sum += part.solid_angle_sr * *radiance;
+      const ShadedEmitter* const met = emitter_met(field_.emitters, p, part.direction);
+      if (met == nullptr) continue;
+      const float visible = met->visibility(p, part.direction).value_or(0);  // without a mask nothing is drawn apart
+      sum += part.solid_angle_sr * (visible * met->radiance);
     }
     return sum / solid_angle;
   }
@@ -107,8 +82,7 @@ class DrawnLight {
 
   const LightField& field_;
   Eigen::Matrix3f world_from_plane_;
-  Eigen::Vector3f origin_;
-  Eigen::Vector2f step_m_;
+  TexelGrid grid_;
   int side_;  // vertices along a side of the tile
 };
 

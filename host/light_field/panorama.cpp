@@ -77,7 +77,7 @@ ImageF make_panorama(const std::vector<FieldView>& views, const Surroundings& su
       };
       if (emitters.concerns(surroundings.centre_in_world, d, texel_rad)) {
         // An emitter, and what stands before it, looks different from every point: the field keeps it by itself.
-        if (emitters.met(surroundings.centre_in_world, d) != nullptr) continue;
+        if (emitter_met(emitters.emitters(), surroundings.centre_in_world, d) != nullptr) continue;
         const Eigen::Vector4f seen = emitters.radiance(nullptr, surroundings.centre_in_world, d, texel_rad, all_views);
         for (int c = 0; c < 4; ++c) panorama.at(x, y, c) = seen[c];
         continue;

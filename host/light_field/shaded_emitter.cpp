@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/light_field/shaded_emitter.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 namespace mf {
@@ -63,6 +64,22 @@ std::optional<float> ShadedEmitter::visibility(const Eigen::Vector3f& p, const E
   add(x1, y1, fx * fy);
   if (weights <= 0) return std::nullopt;
   return sum / weights;
+}
+
+const ShadedEmitter* emitter_met(std::span<const ShadedEmitter> emitters, const Eigen::Vector3f& origin,
+                                 const Eigen::Vector3f& direction) {
+  for (const ShadedEmitter& e : emitters)
+    if (e.met_at(origin, direction)) return &e;
+  return nullptr;
+}
+
+bool may_meet_emitter(std::span<const ShadedEmitter> emitters, const Eigen::Vector3f& p,
+                      const Eigen::Vector3f& direction, float angle_rad) {
+  return std::any_of(emitters.begin(), emitters.end(), [&](const ShadedEmitter& e) {
+    const Eigen::Vector3f to = e.emitter.position - p;
+    const float along = to.dot(direction);
+    return along > 0 && to.cross(direction).norm() < e.emitter.radius_m + angle_rad * along;
+  });
 }
 
 }  // namespace mf

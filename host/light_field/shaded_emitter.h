@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <span>
 
 #include "common/image.h"
 
@@ -56,5 +57,13 @@ struct ShadedEmitter {
   [[nodiscard]] Eigen::Vector2f mask_texel(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
                                            float share) const;
 };
+
+// The emitter that a ray meets, hidden or not; null when it meets none.
+[[nodiscard]] const ShadedEmitter* emitter_met(std::span<const ShadedEmitter>, const Eigen::Vector3f& origin,
+                                               const Eigen::Vector3f& direction);
+
+// Whether rays from p within `angle_rad` of the direction may meet one.
+[[nodiscard]] bool may_meet_emitter(std::span<const ShadedEmitter>, const Eigen::Vector3f& p,
+                                    const Eigen::Vector3f& direction, float angle_rad);
 
 }  // namespace mf

@@ -318,18 +318,18 @@ void TileResampler::blend_texels(const Rays& rays, Lanes3& colour, Lanes& confid
     nearest.add(distances_[c]);
   }
   const auto ask = [&](std::size_t c, const auto& is_needed) {
+    const FieldView& view = views_[candidate_views_[c]];
+    const auto shows_emitter = [&](std::size_t i) {
+      return emitters_.shown_by(view, {rays.focus.x.v[i], rays.focus.y.v[i], rays.focus.z.v[i], rays.focus.w.v[i]},
+                                cell_.angle_rad);
+    };
     Lanes needed;
     float any = 0;
     for (std::size_t i = 0; i < block_lanes; ++i) {
-      needed.v[i] = is_needed(i) ? 1.0F : 0.0F;
+      needed.v[i] = is_needed(i) && !shows_emitter(i) ? 1.0F : 0.0F;
       any += needed.v[i];
     }
     if (any == 0) return;
-    const FieldView& view = views_[candidate_views_[c]];
-    for (std::size_t i = 0; i < block_lanes; ++i) {
-      const ProxyPoint x(rays.focus.x.v[i], rays.focus.y.v[i], rays.focus.z.v[i], rays.focus.w.v[i]);
-      if (needed.v[i] > 0 && emitters_.shown_by(view, x, cell_.angle_rad)) needed.v[i] = 0;
-    }
     cell_of(candidates_[c]).seen(view, rays.focus, needed, seen_lanes_[c], weights_[c]);
     penalize(view, rays.p, rays.focus, weights_[c], penalties_[c]);
   };
@@ -360,12 +360,12 @@ bool TileResampler::near_emitter(int bx, int by) const {
 // shows its glare there) are as those that are known, never as the emitter itself.
 Eigen::Vector4f TileResampler::mean_near_emitter(const Eigen::Vector3f& p) const {
   const std::vector<CellSample>& parts =
-      emitters_.may_meet(p, cell_.direction, cell_.angle_rad) ? cell_.fine_parts : cell_.parts;
+      may_meet_emitter(emitters_.emitters(), p, cell_.direction, cell_.angle_rad) ? cell_.fine_parts : cell_.parts;
   const float part_angle = cell_.angle_rad / std::sqrt(static_cast<float>(parts.size()));
   Eigen::Vector4f on_emitter = Eigen::Vector4f::Zero(), beside = Eigen::Vector4f::Zero();
   float solid_angle = 0, all_beside = 0, unknown_beside = 0;
   for (const CellSample& part : parts) {
-    const ShadedEmitter* const met = emitters_.met(p, part.direction);
+    const ShadedEmitter* const met = emitter_met(emitters_.emitters(), p, part.direction);
     const Eigen::Vector4f seen = emitters_.radiance(met, p, part.direction, part_angle, candidate_views_);
     const Eigen::Vector4f weighted = part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
     solid_angle += part.solid_angle_sr;
