@@ -79,11 +79,6 @@ std::size_t Team::size() const {
   return link_ ? link_->size : 1;
 }
 
-void Team::share(std::span<std::byte> bytes, std::size_t from) const {
-  const Share one{bytes, from};
-  share({&one, 1});
-}
-
 void Team::share(std::span<const Share> shares) const {
   if (!link_) return;
   std::vector<MPI_Request> requests;

@@ -35,7 +35,6 @@ class Team {
   };
   // Many at once: the ranks wait for each other at the end only.
   void share(std::span<const Share>) const;
-  void share(std::span<std::byte> bytes, std::size_t from) const;
 
   // From any rank to rank 0, which receives what came first, or nothing when nothing is there yet and it does not want
   // to wait. send() returns at once, unless much is under way already.
