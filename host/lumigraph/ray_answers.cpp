@@ -31,13 +31,7 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
                                                        float* inverse_depth, float* plain) {
   const std::size_t count = rays.dx.size();
   const AnsweringCamera c = v.camera;
-  const float* dx = rays.dx.data();
-  const float* dy = rays.dy.data();
-  const float* dz = rays.dz.data();
-  const float* depth = rays.depth.data();
-  const float* nx = rays.nx.data();
-  const float* ny = rays.ny.data();
-  const float* nz = rays.nz.data();
+  const auto [dx, dy, dz, depth, nx, ny, nz] = first_of(rays);
   float* out_x = out.x.data();
   float* out_y = out.y.data();
   float* out_lod = out.lod.data();

@@ -28,6 +28,15 @@ struct RayBundle {                    // at most largest_bundle rays
   float beyond = 0;                   // octaves by which the new view is finer than that
 };
 
+// Where its values begin: loops over plain pointers are vectorized.
+struct FirstRay {
+  const float *dx, *dy, *dz, *depth, *nx, *ny, *nz;
+};
+[[nodiscard]] inline FirstRay first_of(const RayBundle& rays) {
+  return {rays.dx.data(), rays.dy.data(), rays.dz.data(), rays.depth.data(),
+          rays.nx.data(), rays.ny.data(), rays.nz.data()};
+}
+
 // What of a photo stays the same from view to view.
 struct AnsweringCamera {
   float fx = 1, fy = 1, cx = 0, cy = 0;

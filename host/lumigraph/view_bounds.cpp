@@ -26,13 +26,7 @@ struct LaneBox {
 };
 
 MF_VECTORIZED void add_rays(const RayBundle& rays, const Eigen::Matrix3f& world_from_cam, LaneBox& box) {
-  const float* dx = rays.dx.data();
-  const float* dy = rays.dy.data();
-  const float* dz = rays.dz.data();
-  const float* depth = rays.depth.data();
-  const float* nx = rays.nx.data();
-  const float* ny = rays.ny.data();
-  const float* nz = rays.nz.data();
+  const auto [dx, dy, dz, depth, nx, ny, nz] = first_of(rays);
   const float focal2 = rays.focal2;
   const float* axis_x = world_from_cam.data();
   const float* axis_y = world_from_cam.data() + 3;
