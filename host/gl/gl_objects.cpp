@@ -103,6 +103,11 @@ GlProgram make_compute_program(std::string_view compute, std::span<const ShaderC
   return program;
 }
 
+void dispatch_over(int width, int height, int group_side) {
+  const auto groups = [&](int pixels) { return static_cast<GLuint>((pixels + group_side - 1) / group_side); };
+  glDispatchCompute(groups(width), groups(height), 1);
+}
+
 GLint gl_limit(GLenum name) {
   GLint value = 0;
   glGetIntegerv(name, &value);

@@ -61,6 +61,8 @@ struct ShaderConstant {
 };
 [[nodiscard]] GlProgram make_compute_program(std::string_view compute, std::span<const ShaderConstant> constants = {});
 
+// Runs the compute program in use over a picture's pixels, in groups of group_side².
+void dispatch_over(int width, int height, int group_side);
 [[nodiscard]] GLint gl_limit(GLenum name);
 
 // Throws std::logic_error naming `what` when OpenGL has reported an error since the last call.

@@ -142,4 +142,12 @@ Bounds bounds_of(const TriangleMesh& mesh) {
   return bounds;
 }
 
+std::array<Eigen::Vector3f, 8> corners_of(const Bounds& box) {
+  std::array<Eigen::Vector3f, 8> corners;
+  for (unsigned i = 0; i < corners.size(); ++i)
+    corners[i] = {(i & 1U) != 0 ? box.high.x() : box.low.x(), (i & 2U) != 0 ? box.high.y() : box.low.y(),
+                  (i & 4U) != 0 ? box.high.z() : box.low.z()};
+  return corners;
+}
+
 }  // namespace mf

@@ -47,5 +47,6 @@ struct Bounds {
   float radius = 0;
 };
 [[nodiscard]] Bounds bounds_of(const TriangleMesh&);
+[[nodiscard]] std::array<Eigen::Vector3f, 8> corners_of(const Bounds&);
 
 }  // namespace mf

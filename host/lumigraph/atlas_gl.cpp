@@ -41,8 +41,8 @@ GlAtlas::GlAtlas(std::span<const std::array<int, 2>> sizes, const Format& format
     glBindTexture(GL_TEXTURE_2D_ARRAY, pages_.back().name());
     glTexStorage3D(GL_TEXTURE_2D_ARRAY, 1, format.stored, atlas_.side, atlas_.side, layers);
     if (glGetError() != GL_NO_ERROR) throw_no_room(what);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, format.filter);
-    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, format.filter);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+    glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
     glTexParameteri(GL_TEXTURE_2D_ARRAY, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
   }

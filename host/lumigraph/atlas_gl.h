@@ -17,7 +17,6 @@ class GlAtlas {
     GLenum stored;             // sized
     GLenum given, given_type;  // of what upload() gets
     int texel_bytes;
-    GLint filter;
   };
   // A current context is a precondition of everything here. No rectangles: no pages. Throws InputError when the card
   // has no room for them, `what` they are, on at most `pages` pages.

@@ -51,10 +51,10 @@ static_assert(offsetof(GlslBlend, wanted) == 16 && offsetof(GlslBlend, count) ==
 constexpr float same_ray = 1e-6F;  // radians: what single precision leaves of an angle of 0
 
 template <typename T>
-constexpr GlAtlas::Format photo_format = {GL_RGBA32F, GL_RGBA, GL_FLOAT, 16, GL_LINEAR};
+constexpr GlAtlas::Format photo_format = {GL_RGBA32F, GL_RGBA, GL_FLOAT, 16};
 template <>
-constexpr GlAtlas::Format photo_format<std::uint8_t> = {GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, 4, GL_LINEAR};
-constexpr GlAtlas::Format sight_format = {GL_RG16, GL_RG, GL_UNSIGNED_SHORT, 4, GL_LINEAR};
+constexpr GlAtlas::Format photo_format<std::uint8_t> = {GL_RGBA8, GL_RGBA, GL_UNSIGNED_BYTE, 4};
+constexpr GlAtlas::Format sight_format = {GL_RG16, GL_RG, GL_UNSIGNED_SHORT, 4};
 
 std::vector<std::array<int, 2>> level_sizes(const PhotoPyramids& pyramids) {
   std::vector<std::array<int, 2>> sizes;
@@ -245,8 +245,7 @@ void GlLumigraph::Impl::draw(const View& view, const LumigraphOptions& options, 
       options.shown == Shown::photos && std::holds_alternative<std::vector<PhotoPyramid<float>>>(lumigraph.pyramids());
   set_target(floats ? GL_RGBA32F : GL_RGBA8, view.camera.width, view.camera.height);
   use_program(o.k, options.shown);
-  const auto groups = [](int pixels) { return static_cast<GLuint>((pixels + group_side - 1) / group_side); };
-  glDispatchCompute(groups(view.camera.width), groups(view.camera.height), 1);
+  dispatch_over(view.camera.width, view.camera.height, group_side);
   glMemoryBarrier(GL_TEXTURE_UPDATE_BARRIER_BIT);
 }
 

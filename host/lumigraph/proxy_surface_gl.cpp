@@ -217,8 +217,7 @@ void GlProxySurface::find(const View& view) {
 
   std::visit([&](const auto& surface) { use_surface(surface, view); }, *proxy_);
   glBindImageTexture(0, surface_.name(), 0, GL_FALSE, 0, GL_WRITE_ONLY, GL_RGBA32F);
-  const auto groups = [](int pixels) { return static_cast<GLuint>((pixels + group_side - 1) / group_side); };
-  glDispatchCompute(groups(view.camera.width), groups(view.camera.height), 1);
+  dispatch_over(view.camera.width, view.camera.height, group_side);
   glMemoryBarrier(GL_TEXTURE_FETCH_BARRIER_BIT);
   glActiveTexture(GL_TEXTURE0 + surface_unit);
   glBindTexture(GL_TEXTURE_2D, surface_.name());

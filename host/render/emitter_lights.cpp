@@ -47,10 +47,7 @@ Rectangle mask_rectangle(const ShadedEmitter& e, const Rigid3& plane_from_world)
 // Where lines from the box to the emitter cross the plane, kept within `all`.
 Rectangle seen_through(const Bounds& box, const Eigen::Vector3f& centre, float radius, const Rectangle& all) {
   Rectangle part{all.high, all.low};
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3f x((corner & 1) != 0 ? box.high.x() : box.low.x(),
-                            (corner & 2) != 0 ? box.high.y() : box.low.y(),
-                            (corner & 4) != 0 ? box.high.z() : box.low.z());
+  for (const Eigen::Vector3f& x : corners_of(box)) {
     if (x.z() >= centre.z() - radius) return all;  // level with the emitter: anywhere
     const float beyond = std::max(0.F, x.z()) / (centre.z() - radius - x.z());
     const Eigen::Vector2f p = x.head<2>() + beyond * (x - centre).head<2>();

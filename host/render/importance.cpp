@@ -109,10 +109,7 @@ CellGroup make_group(const DirectionSet& set, const std::vector<double>& light, 
 void take_in(const Bounds& box, const Eigen::Vector3f& direction, TileRequest& request) {
   constexpr float flattest = 1e-3F;  // a thousand box heights away: outside of any rectangle, and finite
   const Eigen::Vector2f slope = direction.head<2>() / std::max(direction.z(), flattest);
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3f x((corner & 1) != 0 ? box.high.x() : box.low.x(),
-                            (corner & 2) != 0 ? box.high.y() : box.low.y(),
-                            (corner & 4) != 0 ? box.high.z() : box.low.z());
+  for (const Eigen::Vector3f& x : corners_of(box)) {
     const Eigen::Vector2f p = x.head<2>() - slope * x.z();
     request.min_m = request.min_m.cwiseMin(p);
     request.max_m = request.max_m.cwiseMax(p);

@@ -91,10 +91,7 @@ GlslLight shadow_of(const EmitterPoint& light, const Bounds& box, int shadow_map
   constexpr float nearest = 0.01F;  // of the farthest: nearer than that, the object is not in the shadow map
   constexpr float widest = 20;      // tangent: a lamp beside the box sees no more of it
   float far = 1e-6F, near = std::numeric_limits<float>::infinity(), tangent = 1e-6F;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3f x((corner & 1) != 0 ? box.high.x() : box.low.x(),
-                            (corner & 2) != 0 ? box.high.y() : box.low.y(),
-                            (corner & 4) != 0 ? box.high.z() : box.low.z());
+  for (const Eigen::Vector3f& x : corners_of(box)) {
     const float d = ahead.dot(x - y), side = std::max(std::abs(across.dot(x - y)), std::abs(up.dot(x - y)));
     far = std::max(far, rim * d);
     near = std::min(near, d / rim);
