@@ -11,9 +11,11 @@
 #include <map>
 #include <memory>
 
+#include "common/error.h"
+#include "host/gl/backend.h"
 #include "host/io/image_file.h"
+#include "host/lumigraph/frame_renderer.h"
 #include "host/lumigraph/leave_one_out.h"
-#include "host/lumigraph/lumigraph_gl.h"
 #include "host/lumigraph/read_photos.h"
 #include "tests/bench/vertex_field.h"
 #include "tests/host/lumigraph/made_photos.h"
@@ -52,14 +54,22 @@ View around_the_cap(int i) {
 }
 
 // Arguments: photos, their size, k, mesh or plane.
-void frames(benchmark::State& state) {
-  const auto lumigraph =
-      lumigraph_of(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)), state.range(3) != 0);
+std::shared_ptr<const Lumigraph> lumigraph_of(const benchmark::State& state) {
+  return lumigraph_of(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)), state.range(3) != 0);
+}
+void time_frames(benchmark::State& state, const FrameRenderer& renderer) {
   LumigraphOptions options;
   options.penalty.k = static_cast<int>(state.range(2));
+  benchmark::DoNotOptimize(renderer.render(around_the_cap(0), options));  // a driver compiles its shaders
   int i = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(lumigraph->render(around_the_cap(i++), options));
+  for (auto _ : state) benchmark::DoNotOptimize(renderer.render(around_the_cap(i++), options));
+  state.SetLabel(renderer.description());
   state.counters["fps"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+
+void frames(benchmark::State& state) {
+  const auto lumigraph = lumigraph_of(state);
+  time_frames(state, *lumigraph);
 }
 BENCHMARK(frames)
     ->ArgNames({"photos", "size", "k", "mesh"})
@@ -76,22 +86,13 @@ BENCHMARK(frames)
 
 // The same frames by OpenGL, on whatever there is: its name is the label.
 void frames_on_gl(benchmark::State& state) {
-  auto opened = EglContext::open();
-  if (const auto* missing = std::get_if<GlUnavailable>(&opened)) {
-    state.SkipWithError(("no OpenGL: " + missing->reason).c_str());
-    return;
+  try {
+    auto context = open_backend(Backend::gl);
+    const auto lumigraph = lumigraph_of(state);
+    time_frames(state, FrameRenderer(*lumigraph, std::move(context)));
+  } catch (const InputError& missing) {
+    state.SkipWithError(missing.what());
   }
-  auto& context = std::get<EglContext>(opened);
-  state.SetLabel(context.renderer());
-  const auto lumigraph =
-      lumigraph_of(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)), state.range(3) != 0);
-  const GlLumigraph on_gl(context, *lumigraph);
-  LumigraphOptions options;
-  options.penalty.k = static_cast<int>(state.range(2));
-  benchmark::DoNotOptimize(on_gl.render(around_the_cap(0), options));  // the driver compiles its shaders
-  int i = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(on_gl.render(around_the_cap(i++), options));
-  state.counters["fps"] = benchmark::Counter(static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 BENCHMARK(frames_on_gl)
     ->ArgNames({"photos", "size", "k", "mesh"})

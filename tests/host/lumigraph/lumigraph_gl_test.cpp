@@ -15,6 +15,7 @@
 #include "host/lumigraph/frame_renderer.h"
 #include "host/lumigraph/leave_one_out.h"
 #include "tests/host/lumigraph/made_photos.h"
+#include "tests/support/gl_test.h"
 
 namespace mf {
 namespace {
@@ -89,14 +90,8 @@ double covered(const LumigraphPicture& picture) {
                  static_cast<double>(data.size());
 }
 
-class LumigraphOnGl : public testing::Test {
+class LumigraphOnGl : public test::GlTest {
  protected:
-  void SetUp() override {
-    auto opened = EglContext::open();
-    if (const auto* missing = std::get_if<GlUnavailable>(&opened)) GTEST_SKIP() << "no OpenGL: " << missing->reason;
-    context_.emplace(std::get<EglContext>(std::move(opened)));
-  }
-
   // Outlines are where a mesh may be met a pixel away.
   void expect_same(const Lumigraph& lumigraph, const View& view, const LumigraphOptions& options, double outlines,
                    std::span<const std::uint32_t> views = {}) {
@@ -113,7 +108,6 @@ class LumigraphOnGl : public testing::Test {
                                100 * d.uncovered));
   }
 
-  std::optional<EglContext> context_;
   int comparisons_ = 0;
 };
 

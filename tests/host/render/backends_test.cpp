@@ -5,28 +5,22 @@
 #include <iostream>
 
 #include "common/error.h"
-#include "host/gl/egl_context.h"
 #include "host/gl/shader_source.h"
 #include "host/render/irradiance_gl.h"
 #include "tests/host/render/scenes.h"
+#include "tests/support/gl_test.h"
 
 namespace mf {
 namespace {
 
 using test::pi;
 
-class Backends : public testing::Test {
+class Backends : public test::GlTest {
  protected:
-  void SetUp() override {
-    auto opened = EglContext::open();
-    if (const auto* missing = std::get_if<GlUnavailable>(&opened)) GTEST_SKIP() << "no OpenGL: " << missing->reason;
-    context_.emplace(std::get<EglContext>(std::move(opened)));
-  }
   std::vector<Eigen::Vector3f> on_gl(const TriangleMesh& mesh, std::span<const SurfacePoint> points,
                                      const LightSet& lights, LightSum sum) {
     return GlIrradiance(*context_, mesh, {}).irradiance(points, lights, sum);
   }
-  std::optional<EglContext> context_;
 };
 
 // A lamp, a coloured sky, and a different light at every place of the plane.
