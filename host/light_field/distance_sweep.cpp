@@ -4,10 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <span>
 
 #include "host/light_field/view_sieve.h"
 
@@ -23,36 +20,33 @@ constexpr int level_count = 28;        // inverse distances, evenly from 0
 constexpr float nearest_share = 0.8F;  // of the rectangle's half diagonal: nothing nearer is looked for
 constexpr float sweep_angle_rad = 0.015F;
 constexpr float occluded_stops = 1.0F;  // a vote further off than this counts as this
-constexpr std::size_t fewest_votes = 4;
-constexpr float doubt_votes = 8;               // a cost counts as if so many further votes had said doubt_stops:
-constexpr float doubt_stops = 0.6F;            // few views that happen to agree are no evidence
+constexpr float doubt_votes = 8;        // a cost counts as if so many further votes of the pool had said doubt_stops
+constexpr float doubt_stops = 0.25F;
 constexpr float far_preference_stops = 0.05F;  // by which the nearest level must be better than the farthest
-constexpr float smoothing_cells = 1.3F;        // σ over directions
+constexpr float pool_cells = 1.3F;             // σ over directions
 
-float cost_of(std::vector<float>& votes, int level) {
-  const float n = static_cast<float>(votes.size()), spread = static_cast<float>(robust_spread(votes, occluded_stops));
-  return (n * spread + doubt_votes * doubt_stops) / (n + doubt_votes) +
-         far_preference_stops * static_cast<float>(level) / (level_count - 1);
-}
+// A level's votes for each direction: the sum of their distances from their median, and how many tell something, which
+// the first does not.
+constexpr int disagreement = 0, told = 1;
 
-// Gaussian over directions; cells without a cost are left out, and filled from their neighbours.
-ImageF smoothed(const ImageF& cost) {
-  const int reach = static_cast<int>(std::ceil(3 * smoothing_cells));
-  ImageF out(cost.width, cost.height, 1, std::numeric_limits<float>::infinity());
-  for (int y = 0; y < cost.height; ++y)
-    for (int x = 0; x < cost.width; ++x) {
-      float sum = 0, weights = 0;
-      for (int dy = -reach; dy <= reach; ++dy)
-        for (int dx = -reach; dx <= reach; ++dx) {
-          const int tx = x + dx, ty = y + dy;
-          if (tx < 0 || ty < 0 || tx >= cost.width || ty >= cost.height || !std::isfinite(cost.at(tx, ty))) continue;
-          const float w = std::exp(-0.5F * static_cast<float>(dx * dx + dy * dy) / (smoothing_cells * smoothing_cells));
-          sum += w * cost.at(tx, ty);
-          weights += w;
+// Gaussian sums over directions, and what they say.
+ImageF pooled_cost(const ImageF& votes, int level) {
+  const int reach = static_cast<int>(std::ceil(3 * pool_cells));
+  const float preference = far_preference_stops * static_cast<float>(level) / (level_count - 1);
+  ImageF cost(votes.width, votes.height, 1);
+  for (int y = 0; y < votes.height; ++y)
+    for (int x = 0; x < votes.width; ++x) {
+      float stops = doubt_votes * doubt_stops, count = doubt_votes;
+      for (int ty = std::max(y - reach, 0); ty <= std::min(y + reach, votes.height - 1); ++ty)
+        for (int tx = std::max(x - reach, 0); tx <= std::min(x + reach, votes.width - 1); ++tx) {
+          const auto squared = static_cast<float>((tx - x) * (tx - x) + (ty - y) * (ty - y));
+          const float w = std::exp(-0.5F * squared / (pool_cells * pool_cells));
+          stops += w * votes.at(tx, ty, disagreement);
+          count += w * votes.at(tx, ty, told);
         }
-      if (weights > 0) out.at(x, y) = sum / weights;
+      cost.at(x, y) = stops / count + preference;
     }
-  return out;
+  return cost;
 }
 
 }  // namespace
@@ -76,8 +70,8 @@ DistanceSweep sweep_surroundings(const std::vector<FieldView>& views, const Plan
   DistanceSweep sweep;
   sweep.centre_in_world = centre_of(rectangle);
   sweep.level_step = 1 / nearest_m / static_cast<float>(level_count - 1);
-  sweep.cost.assign(static_cast<std::size_t>(level_count),
-                    ImageF(map_size, map_size, 1, std::numeric_limits<float>::infinity()));
+  sweep.cost.assign(static_cast<std::size_t>(level_count), ImageF(map_size, map_size, 1));
+  std::vector<ImageF> votes_of(static_cast<std::size_t>(level_count), ImageF(map_size, map_size, 2));
   const ViewSieve sieve(views);
   tbb::parallel_for(0, map_size, [&](int y) {
     if (!team.has(static_cast<std::size_t>(y))) return;
@@ -91,66 +85,19 @@ DistanceSweep sweep_surroundings(const std::vector<FieldView>& views, const Plan
         sieve.find(point, sweep_angle_rad, voters);
         for (const std::uint32_t v : voters)
           if (const auto value = log_luminance(views[v], point, sweep_angle_rad)) votes.push_back(*value);
-        if (votes.size() >= fewest_votes) sweep.cost[static_cast<std::size_t>(level)].at(x, y) = cost_of(votes, level);
+        if (votes.size() < 2) continue;
+        const auto count = static_cast<float>(votes.size());
+        ImageF& level_votes = votes_of[static_cast<std::size_t>(level)];
+        level_votes.at(x, y, disagreement) = count * static_cast<float>(robust_spread(votes, occluded_stops));
+        level_votes.at(x, y, told) = count - 1;
       }
   });
-  for (ImageF& level : sweep.cost) share_rows(team, level);
-  tbb::parallel_for(std::size_t{0}, sweep.cost.size(),
-                    [&](std::size_t level) { sweep.cost[level] = smoothed(sweep.cost[level]); });
+  for (ImageF& votes : votes_of) share_rows(team, votes);
+  tbb::parallel_for(0, level_count, [&](int level) {
+    const auto i = static_cast<std::size_t>(level);
+    sweep.cost[i] = pooled_cost(votes_of[i], level);
+  });
   return sweep;
-}
-
-namespace {
-
-// Penalties of semi-global matching, stops; and what a cell costs that too few views know.
-constexpr float next_level_stops = 0.015F;
-constexpr float any_level_stops = 0.06F;
-constexpr float unknown_stops = doubt_stops;
-
-// One path's costs at a cell, from those of the cell before it on the path.
-void continue_path(std::span<const float> before, std::span<const float> own, std::span<float> path) {
-  const float least = *std::min_element(before.begin(), before.end());
-  for (std::size_t i = 0; i < own.size(); ++i) {
-    float from = std::min(before[i], least + any_level_stops);
-    if (i > 0) from = std::min(from, before[i - 1] + next_level_stops);
-    if (i + 1 < own.size()) from = std::min(from, before[i + 1] + next_level_stops);
-    path[i] = own[i] + from - least;
-  }
-}
-
-}  // namespace
-
-DistanceSweep regularized(const DistanceSweep& sweep) {
-  const int side = sweep.side();
-  const auto levels = static_cast<std::size_t>(sweep.levels());
-  const auto cell = [&](int x, int y) { return static_cast<std::size_t>(y * side + x) * levels; };
-  std::vector<float> own(static_cast<std::size_t>(side * side) * levels), sum(own.size(), 0.0F);
-  for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x)
-      for (std::size_t i = 0; i < levels; ++i) {
-        const float cost = sweep.cost[i].at(x, y);
-        own[cell(x, y) + i] = std::isfinite(cost) ? cost : unknown_stops;
-      }
-  constexpr std::array<std::array<int, 2>, 8> steps{
-      {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}}};
-  for (const auto& [dx, dy] : steps) {
-    std::vector<float> path = own;
-    for (int row = 0; row < side; ++row)
-      for (int column = 0; column < side; ++column) {
-        const int x = dx < 0 ? side - 1 - column : column, y = dy < 0 ? side - 1 - row : row;
-        const int px = x - dx, py = y - dy;
-        const std::size_t at = cell(x, y);
-        if (px >= 0 && py >= 0 && px < side && py < side)
-          continue_path({&path[cell(px, py)], levels}, {&own[at], levels}, {&path[at], levels});
-        for (std::size_t i = 0; i < levels; ++i) sum[at + i] += path[at + i];
-      }
-  }
-  DistanceSweep out = sweep;
-  for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x)
-      for (std::size_t i = 0; i < levels; ++i)
-        out.cost[i].at(x, y) = sum[cell(x, y) + i] / static_cast<float>(steps.size());
-  return out;
 }
 
 std::optional<float> log_luminance(const FieldView& view, const ProxyPoint& x, float angle_rad) {

@@ -16,31 +16,27 @@ namespace mf {
 // over inverse distance (Collins 1996) in which all views that see a point vote.
 //
 // The cost is the robust spread of their absolute log2 radiance, stops: the capture is radiometrically calibrated, so
-// nothing is normalized. A view that an occluder or a gloss deceives counts once, not by how far off it is. Few views
-// that happen to agree are no evidence: a cost counts as if some further votes had disagreed.
+// nothing is normalized. A view that an occluder or a gloss deceives counts once, not by how far off it is. The votes
+// of neighbouring directions are pooled, each for as much as it tells: many more views see a near point than a far one,
+// and a distance must not win by that. What no view tells of counts as a moderate disagreement: better than a distance
+// at which many disagree, worse than one at which they agree.
 struct DistanceSweep {
   Eigen::Vector3f centre_in_world = Eigen::Vector3f::Zero();
   float level_step = 0;  // 1/metres: level i lies at the inverse distance i · level_step
-  // By level; equal-area map of directions, one channel, smoothed over directions. Infinite where too few views vote.
+  // By level; equal-area map of directions, one channel.
   std::vector<ImageF> cost;
 
   [[nodiscard]] int side() const { return cost.front().width; }
   [[nodiscard]] int levels() const { return static_cast<int>(cost.size()); }
   // World direction of a cell's middle.
   [[nodiscard]] Eigen::Vector3f direction(int x, int y) const;
-  // Between levels linear; beyond the nearest that level's. Infinite where a level beside it is.
+  // Between levels linear; beyond the nearest that level's.
   [[nodiscard]] float cost_at(int x, int y, float inverse_distance) const;
 };
 
 // A team shares the work.
 [[nodiscard]] DistanceSweep sweep_surroundings(const std::vector<FieldView>& views, const PlaneRectangle&,
                                                const Team& = {});
-
-// Costs that also count what the directions around would have to pay: along eight paths over the map each direction
-// adds the least cost of its predecessor, plus a little for the next level and more for any farther one (semi-global
-// matching, Hirschmüller 2008, eq. 13). Directions that few views know take the distance of those around them; edges
-// stay.
-[[nodiscard]] DistanceSweep regularized(const DistanceSweep&);
 
 // log2 luminance of what a view shows of the proxy point, over about `angle_rad`; nothing when it does not see it well
 // inside of its border.

@@ -26,19 +26,19 @@ RoomBox box_of(const Sides& sides, const Eigen::Vector3f& centre) {
   return box;
 }
 
-// Directions that the sweep knows at some distance, and their cosine to each side's normal.
+// A direction of the sweep, and its cosine to each side's normal.
 struct Ray {
   int x = 0, y = 0;
   Sides towards{};
 };
 
-std::vector<Ray> known_rays(const DistanceSweep& sweep) {
+std::vector<Ray> rays_of(const DistanceSweep& sweep) {
   std::vector<Ray> rays;
   for (int y = 0; y < sweep.side(); ++y)
     for (int x = 0; x < sweep.side(); ++x) {
       const Eigen::Vector2f disc(2 * (static_cast<float>(x) + 0.5F) / static_cast<float>(sweep.side()) - 1,
                                  2 * (static_cast<float>(y) + 0.5F) / static_cast<float>(sweep.side()) - 1);
-      if (disc.norm() >= 1 || !std::isfinite(sweep.cost.front().at(x, y))) continue;
+      if (disc.norm() >= 1) continue;
       const Eigen::Vector3f d = sweep.direction(x, y);
       rays.push_back({x, y, {-d.x(), -d.y(), d.x(), d.y(), d.z()}});
     }
@@ -46,16 +46,13 @@ std::vector<Ray> known_rays(const DistanceSweep& sweep) {
 }
 
 double mean_cost(const DistanceSweep& sweep, const std::vector<Ray>& rays, const Sides& sides) {
-  double sum = 0, count = 0;
+  double sum = 0;
   for (const Ray& ray : rays) {
     float inverse = 0;
     for (std::size_t i = 0; i < sides.size(); ++i) inverse = std::max(inverse, sides[i] * ray.towards[i]);
-    const float cost = sweep.cost_at(ray.x, ray.y, inverse);
-    // Few views look at the nearest distances of a low direction: that must not count for a near wall.
-    sum += static_cast<double>(std::isfinite(cost) ? cost : 1.0F);
-    count += 1;
+    sum += static_cast<double>(sweep.cost_at(ray.x, ray.y, inverse));
   }
-  return count > 0 ? sum / count : 0;
+  return sum / static_cast<double>(rays.size());
 }
 
 struct Try {
@@ -84,7 +81,7 @@ Try descend(const DistanceSweep& sweep, const std::vector<Ray>& rays, Sides side
 }  // namespace
 
 RoomBox fit_room(const DistanceSweep& sweep) {
-  const std::vector<Ray> rays = known_rays(sweep);
+  const std::vector<Ray> rays = rays_of(sweep);
   constexpr std::array<float, 6> shares{0, 0.08F, 0.16F, 0.25F, 0.4F, 0.6F};  // of the sweep's nearest, inverted
   std::array<Try, shares.size()> tries;
   tbb::parallel_for(std::size_t{0}, shares.size(), [&](std::size_t i) {

@@ -100,6 +100,7 @@ namespace {
 
 constexpr float emitter_margin_m = 0.1F;  // by about so much the views blended for a ray pass it by: so far off the
                                           // emitter still shows in one of them, and must show in its place
+
 // The level of least cost, between levels by a parabola; and how far the mean cost lies above it, relative.
 struct BestLevel {
   float level = 0;
@@ -107,18 +108,15 @@ struct BestLevel {
 };
 BestLevel best_level(const DistanceSweep& sweep, int x, int y) {
   const auto at = [&](int level) { return sweep.cost[static_cast<std::size_t>(level)].at(x, y); };
-  int best = 0, counted = 0;
-  float mean = 0;
+  int best = 0;
+  float sum = 0;
   for (int level = 0; level < sweep.levels(); ++level) {
-    if (!std::isfinite(at(level))) continue;
-    mean += at(level);
-    ++counted;
+    sum += at(level);
     if (at(level) < at(best)) best = level;
   }
-  if (counted == 0) return {};
-  mean /= static_cast<float>(counted);
-  BestLevel out{static_cast<float>(best), mean > 0 ? std::clamp(1 - at(best) / mean, 0.0F, 1.0F) : 0};
-  if (best > 0 && best + 1 < sweep.levels() && std::isfinite(at(best - 1)) && std::isfinite(at(best + 1))) {
+  const float mean = sum / static_cast<float>(sweep.levels());
+  BestLevel out{static_cast<float>(best), std::clamp(1 - at(best) / mean, 0.0F, 1.0F)};
+  if (best > 0 && best + 1 < sweep.levels()) {
     const float curvature = at(best - 1) - 2 * at(best) + at(best + 1);
     if (curvature > 0) out.level += std::clamp(0.5F * (at(best - 1) - at(best + 1)) / curvature, -0.5F, 0.5F);
   }

@@ -194,9 +194,6 @@ void mirror_capture(const fs::path& folder) {
     const ProxyChoice choice = choose_proxy(others, *rectangle, proxy, usual.k, emitters, Team());
     e.row(proxy == "auto" ? proxy : surroundings_name(choice.surroundings), choice.surroundings, usual);
     if (proxy == "auto") vary_blending(e, "auto", choice.surroundings);
-    if (proxy == "auto")
-      e.row("auto, regularized", find_surroundings(regularized(sweep_surroundings(others, *rectangle)), emitters),
-            usual);
     if (proxy == "sphere:inf") vary_blending(e, "distant sphere", choice.surroundings);
   }
 }
