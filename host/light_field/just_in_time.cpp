@@ -55,10 +55,11 @@ PlaneTile even_tile(const Rectangle& r, int texels) {
 // One thread's working memory: a light field of few texels, whose rectangle is the request's.
 class Worker {
  public:
-  Worker(const std::vector<FieldView>& views, const LightField& focused, const EmitterBlender& emitters,
-         const HoleFiller& filler, const PenaltyOptions& penalty, int most_texels)
+  Worker(const std::vector<FieldView>& views, const LightField& focused, const ProxyVisibility& visibility,
+         const EmitterBlender& emitters, const HoleFiller& filler, const PenaltyOptions& penalty, int most_texels)
       : views_(views),
         focused_(focused),
+        visibility_(visibility),
         emitters_(emitters),
         filler_(filler),
         penalty_(penalty),
@@ -74,7 +75,7 @@ class Worker {
     PlaneTile tile = even_tile(where, part_.resolution);
     of_cell_ = tile;
     part_.plane = {focused_.plane.world_from_plane, tile.min_m.cast<double>(), tile.max_m.cast<double>()};
-    TileResampler resampler(views_, part_, emitters_, penalty_);
+    TileResampler resampler(views_, part_, visibility_, emitters_, penalty_);
     float solid_angle = 0;
     for (const std::uint32_t cell : request.cells) solid_angle += part_.directions.solid_angles_sr[cell];
     for (const std::uint32_t cell : request.cells) {
@@ -97,6 +98,7 @@ class Worker {
 
   const std::vector<FieldView>& views_;
   const LightField& focused_;
+  const ProxyVisibility& visibility_;
   const EmitterBlender& emitters_;
   const HoleFiller& filler_;
   PenaltyOptions penalty_;
@@ -148,11 +150,12 @@ std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views
                                              const JustInTimeOptions& options) {
   check(options.most_texels >= 8 && options.most_texels % 8 == 0, "a multiple of 8 texels");
   if (focused.surroundings.is_plane()) return over_the_plane(views, focused, penalty.k, requests, options.most_texels);
+  const ProxyVisibility visibility(views, focused.surroundings, focused.plane);
   // Emitters are black here, and views that show their glare have no say.
   const EmitterBlender emitters(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no);
   const HoleFiller filler(focused);
   tbb::enumerable_thread_specific<Worker> workers(
-      [&] { return Worker(views, focused, emitters, filler, penalty, options.most_texels); });
+      [&] { return Worker(views, focused, visibility, emitters, filler, penalty, options.most_texels); });
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(),
                     [&](std::size_t i) { tiles[i] = workers.local().fill(requests[i]); });

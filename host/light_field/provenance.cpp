@@ -41,6 +41,7 @@ Provenance trace_provenance(const std::vector<FieldView>& views, const LightFiel
   out.emitter.resize(blocks);
   const float texel_m = static_cast<float>(field.plane.size_m().maxCoeff()) / static_cast<float>(field.resolution);
   const Eigen::Matrix3f turn = field.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
+  const ProxyVisibility visibility(views, field.surroundings, field.plane);
   tbb::parallel_for(std::size_t{0}, field.directions.size(), [&](std::size_t i) {
     for (int y = 0; y < out.side; ++y)
       for (int x = 0; x < out.side; ++x) {
@@ -54,7 +55,7 @@ Provenance trace_provenance(const std::vector<FieldView>& views, const LightFiel
         const WantedRay ray{(field.plane.world_from_plane * p).cast<float>(), turn * field.directions.directions[i],
                             field.surroundings.is_plane() ? texel_m : std::sqrt(field.directions.solid_angles_sr[i])};
         const std::size_t block = out.block(i, x, y);
-        const RayAnswer answer = answer_of(views, field.surroundings, ray, {penalty, false, {}});
+        const RayAnswer answer = answer_of(views, field.surroundings, ray, {penalty, &visibility, &emitters, {}});
         for (std::size_t rank = 0; rank < answer.speaking.size(); ++rank)
           out.shares[block * static_cast<std::size_t>(out.k) + rank] = {
               static_cast<std::uint32_t>(views[answer.speaking[rank].view].frame), answer.speaking[rank].weight};

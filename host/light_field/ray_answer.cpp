@@ -26,37 +26,24 @@ struct Answering {
 };
 
 std::optional<Answering> ask(const FieldView& view, std::uint32_t index, const Surroundings& surroundings,
-                             const WantedRay& ray, const ProxyPoint& x, bool with_visibility) {
+                             const WantedRay& ray, const ProxyPoint& x, const AnswerOptions& options) {
+  if (options.emitters != nullptr && options.emitters->shown_by(view, x, ray.angle_rad)) return std::nullopt;
   const Eigen::Vector3f pixel = pixel_of(view, x);
   if (pixel.z() <= 0) return std::nullopt;
+  const float visible = options.visibility != nullptr ? options.visibility->of_view(index, x) : 1.0F;
   const Eigen::Vector4f seen =
-      view.fetch(level_for_angle(view, x, ray.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
+      visible * view.fetch(level_for_angle(view, x, ray.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
   if (seen.w() < least_answer) return std::nullopt;
   RayTerms terms;
   terms.angle = surroundings.is_plane() ? angle_between(ray_to(x, view.centre_in_world), ray.direction)
                                         : ray_distance(ray.p, x, view.centre_in_world);
   const float pixels = ray.angle_rad / ray_to(x, view.centre_in_world).norm() * view.focal_px;
   terms.resolution = coarseness(pixels * pixels, 1);
-  terms.weight = seen.w() * (with_visibility ? visibility(surroundings, ray.p, x, view.centre_in_world) : 1.0F);
-  if (terms.weight < least_answer) return std::nullopt;
+  terms.weight = seen.w();
   return Answering{index, terms, seen};
 }
 
 }  // namespace
-
-float visibility(const Surroundings& surroundings, const Eigen::Vector3f& p, const ProxyPoint& x,
-                 const Eigen::Vector3f& centre) {
-  if (surroundings.is_plane()) return 1;
-  const Eigen::Vector3f r = ray_to(x, centre).normalized();
-  const Eigen::Vector3f passes = centre + (p - centre).dot(r) * r;
-  // Inverse distances from there: of X, and of what the proxy puts first on that ray.
-  const float expected = x.w() / (x.head<3>() - x.w() * passes).norm();
-  const float met = surroundings.inverse_distance_along(passes, r);
-  constexpr float tolerance = 0.1F;       // of the inverse distance: two neighbouring rays of one slanted wall
-  constexpr float least_inverse = 0.05F;  // 1/metres: what is beyond 20 m all lies together
-  const float nearer = (met - expected) / (tolerance * (expected + least_inverse));
-  return std::clamp(2 - nearer, 0.0F, 1.0F);
-}
 
 RayAnswer answer_of(std::span<const FieldView> views, const Surroundings& surroundings, const WantedRay& ray,
                     const AnswerOptions& options) {
@@ -67,7 +54,7 @@ RayAnswer answer_of(std::span<const FieldView> views, const Surroundings& surrou
   std::vector<ViewPenalty> ranked;
   for (std::uint32_t i = 0; i < views.size(); ++i) {
     if (options.except == i) continue;
-    const auto answer = ask(views[i], i, surroundings, ray, x, options.visibility);
+    const auto answer = ask(views[i], i, surroundings, ray, x, options);
     if (!answer) continue;
     ranked.push_back({static_cast<std::uint32_t>(answering.size()), penalty_of(options.penalty, answer->terms)});
     answering.push_back(*answer);

@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "host/blending/ray_penalty.h"
+#include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
+#include "host/light_field/proxy_visibility.h"
 #include "host/light_field/surroundings.h"
 #include "host/light_field/view_rays.h"
 
@@ -36,19 +38,13 @@ struct RayAnswer {
   std::vector<SpeakingView> speaking;  // heaviest first
 };
 
-// How much of the proxy point X a view can see past the proxy itself, for a ray at p: 1 all, 0 none, softly between.
-// The view's ray is followed from where it passes p. A proxy seen from behind its own front hides what lies behind: a
-// leaf's edge, a corner.
-[[nodiscard]] float visibility(const Surroundings&, const Eigen::Vector3f& p, const ProxyPoint& x,
-                               const Eigen::Vector3f& view_centre);
-
-// One ray, blended from all views by ranking every one of them: what the tiles hold, without their shortcuts, and why.
-// Emitters are not looked at. `except`: a view that does not take part (leave one out). `visibility`: ask the proxy
-// itself whether it hides X from a view, by a ray of its own from where the view's ray passes p.
+// One ray that meets no emitter, blended from all views by ranking every one of them: what the tiles hold, without
+// their shortcuts, and why.
 struct AnswerOptions {
   PenaltyOptions penalty;
-  bool visibility = false;
-  std::optional<std::uint32_t> except;
+  const ProxyVisibility* visibility = nullptr;  // where given, views see X as far as the proxy does not hide it
+  const EmitterBlender* emitters = nullptr;     // where given, views that show one of them there have no say
+  std::optional<std::uint32_t> except;          // a view that does not take part (leave one out)
 };
 [[nodiscard]] RayAnswer answer_of(std::span<const FieldView>, const Surroundings&, const WantedRay&,
                                   const AnswerOptions&);

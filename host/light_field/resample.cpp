@@ -69,8 +69,9 @@ struct Resampling::Impl {
   LightField field;
   std::vector<SphereScore> sphere_scores;
   double focusing_s = 0;
-  // The plane needs the one, every other proxy the other.
+  // The plane needs the first and its tiles, every other proxy the others.
   std::optional<RectifiedViews> rectified;
+  std::optional<ProxyVisibility> visibility;
   std::optional<EmitterBlender> emitters;
   std::optional<tbb::enumerable_thread_specific<PlaneTiles>> plane_tiles;
   std::optional<tbb::enumerable_thread_specific<TileResampler>> resamplers;
@@ -79,7 +80,7 @@ struct Resampling::Impl {
 
 Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle& rectangle,
                        const ResampleOptions& options, const Team& team, const Progress& progress)
-    : impl_(new Impl{views, {}, {}, {}, 0, {}, {}, {}, {}, {}}) {
+    : impl_(new Impl{views, {}, {}, {}, 0, {}, {}, {}, {}, {}, {}}) {
   check(!options.validate().has_value(), "resample options are validated by the caller");
   const auto start = Clock::now();
   report_progress(progress, "focusing", 0);
@@ -99,10 +100,11 @@ Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle
     i.rectified.emplace(views, rectangle, options.size);
     i.plane_tiles.emplace([&i, k] { return PlaneTiles(*i.rectified, i.field, k); });
   } else {
+    i.visibility.emplace(views, field.surroundings, rectangle);
     i.emitters.emplace(views, field.surroundings, emitters, rectangle, team);
     field.emitters = i.emitters->emitters();
     field.surroundings.panorama = make_panorama(views, field.surroundings, *i.emitters, panorama_width, team);
-    i.resamplers.emplace([&i] { return TileResampler(i.views, i.field, *i.emitters, i.penalty); });
+    i.resamplers.emplace([&i] { return TileResampler(i.views, i.field, *i.visibility, *i.emitters, i.penalty); });
   }
   if (options.fill) i.filler.emplace(field);
   report_progress(progress, "focusing", 1);

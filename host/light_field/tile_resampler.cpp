@@ -29,9 +29,11 @@ Lanes all_lanes(float value) {
 }  // namespace
 
 TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field,
-                             const EmitterBlender& emitters, const PenaltyOptions& penalty)
+                             const ProxyVisibility& visibility, const EmitterBlender& emitters,
+                             const PenaltyOptions& penalty)
     : views_(views),
       field_(field),
+      visibility_(visibility),
       emitters_(emitters),
       sieve_(views),
       grid_(field.plane, field.resolution),
@@ -126,7 +128,9 @@ void TileResampler::rank_views(int corner_x, int corner_y) {
     const FieldView& view = views_[lookers_.views[i]];
     const Look& look = looks_[i];
     if (look.level == Look::nowhere) return INFINITY;
-    const float weight = view.fetch(look.level, look.u, look.v).w();
+    float weight = view.fetch(look.level, look.u, look.v).w();
+    if (weight < smallest_view_weight) return INFINITY;
+    weight *= visibility_.of_view(lookers_.views[i], v.focus);
     if (weight < smallest_view_weight) return INFINITY;
     // A lamp that is nearer than the proxy, or farther, shows elsewhere too, in views that pass by. Cells near it have
     // spare views instead: which of their parts a view may speak for is asked later.
@@ -172,9 +176,11 @@ const Eigen::Vector4f& TileResampler::seen_at(std::size_t looker, int x, int y) 
             static_cast<std::size_t>(x)];
   if (seen.stamp != stamp) {
     const FieldView& view = views_[lookers_.views[looker]];
-    seen.colour = emitters_.shown_by(view, vertex(x, y).focus, cell_.angle_rad)
+    const Vertex& at = vertex(x, y);
+    seen.colour = emitters_.shown_by(view, at.focus, cell_.angle_rad)
                       ? Eigen::Vector4f(Eigen::Vector4f::Zero())
-                      : cell_of(looker).seen(view, vertex(x, y).focus);
+                      : Eigen::Vector4f(visibility_.of_view(lookers_.views[looker], at.focus) *
+                                        cell_of(looker).seen(view, at.focus));
     seen.stamp = stamp;
   }
   return seen.colour;
@@ -331,6 +337,7 @@ void TileResampler::blend_texels(const Rays& rays, Lanes3& colour, Lanes& confid
     }
     if (any == 0) return;
     cell_of(candidates_[c]).seen(view, rays.focus, needed, seen_lanes_[c], weights_[c]);
+    if (visibility_.hides_itself()) dim_hidden(candidate_views_[c], rays.focus, seen_lanes_[c], weights_[c]);
     penalize(view, rays.p, rays.focus, weights_[c], penalties_[c]);
   };
   const Lanes& reach = nearest.greatest();
@@ -342,6 +349,18 @@ void TileResampler::blend_texels(const Rays& rays, Lanes3& colour, Lanes& confid
     ask(c, [&](std::size_t i) { return distances_[c].v[i] > reach.v[i] && distances_[c].v[i] < best.greatest().v[i]; });
   weights_of(penalties_, weights_, penalty_.k, same_ray, confidence);
   for (std::size_t c = 0; c < count; ++c) add_colours(seen_lanes_[c], penalties_[c], colour);
+}
+
+// What the view saw of each texel's ray, as far as it sees that past the proxy.
+void TileResampler::dim_hidden(std::uint32_t view, const Lanes4& focus, Lanes3& seen, Lanes& weight) const {
+  for (std::size_t i = 0; i < block_lanes; ++i) {
+    if (weight.v[i] < smallest_view_weight) continue;
+    const float share = visibility_.of_view(view, {focus.x.v[i], focus.y.v[i], focus.z.v[i], focus.w.v[i]});
+    weight.v[i] *= share;
+    seen.x.v[i] *= share;
+    seen.y.v[i] *= share;
+    seen.z.v[i] *= share;
+  }
 }
 
 // ---- near emitters ----

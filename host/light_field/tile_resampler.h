@@ -12,6 +12,7 @@
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/proxy_visibility.h"
 #include "host/light_field/rectified_views.h"
 #include "host/light_field/view_ranking.h"
 #include "host/light_field/view_rays.h"
@@ -29,8 +30,8 @@ namespace mf {
 class TileResampler {
  public:
   // Keeps references to all; `field` has everything but its texels.
-  TileResampler(const std::vector<FieldView>& views, const LightField& field, const EmitterBlender& emitters,
-                const PenaltyOptions&);
+  TileResampler(const std::vector<FieldView>& views, const LightField& field, const ProxyVisibility&,
+                const EmitterBlender&, const PenaltyOptions&);
 
   // Precondition: `tile` holds resolution² texels.
   void fill(std::size_t direction, Eigen::Vector4f* tile);
@@ -85,6 +86,7 @@ class TileResampler {
   [[nodiscard]] bool is_smooth() const;
   void blend_patches(const Rays&, Lanes3& colour, Lanes& confidence);
   void blend_texels(const Rays&, Lanes3& colour, Lanes& confidence);
+  void dim_hidden(std::uint32_t view, const Lanes4& focus, Lanes3& seen, Lanes& weight) const;
   [[nodiscard]] const Eigen::Vector4f& seen_at(std::size_t looker, int vertex_x, int vertex_y);
   [[nodiscard]] const CellInView& cell_of(std::size_t looker);
 
@@ -101,6 +103,7 @@ class TileResampler {
 
   const std::vector<FieldView>& views_;
   const LightField& field_;
+  const ProxyVisibility& visibility_;
   const EmitterBlender& emitters_;
   ViewSieve sieve_;
   TexelGrid grid_;

@@ -24,6 +24,7 @@
 #include <fstream>
 #include <numeric>
 #include <random>
+#include <sstream>
 
 #if MF_HAVE_OPENCV
 #include <opencv2/imgcodecs.hpp>
@@ -69,11 +70,13 @@ float log2_luminance(const Eigen::Vector3f& c) {
 }
 
 Score score_of(const std::vector<FieldView>& views, const Surroundings& surroundings,
-               const std::vector<LeftOutRay>& rays, const PenaltyOptions& penalty, bool visibility) {
+               const std::vector<LeftOutRay>& rays, AnswerOptions options) {
   constexpr float unanswered = 1e9F;
   std::vector<float> predicted(rays.size(), unanswered);
   tbb::parallel_for(std::size_t{0}, rays.size(), [&](std::size_t i) {
-    const RayAnswer answer = answer_of(views, surroundings, rays[i].ray, {penalty, visibility, rays[i].view});
+    AnswerOptions except = options;
+    except.except = rays[i].view;
+    const RayAnswer answer = answer_of(views, surroundings, rays[i].ray, except);
     if (!answer.speaking.empty()) predicted[i] = log2_luminance(answer.radiance);
   });
   std::vector<float> errors, seen;
@@ -155,10 +158,17 @@ std::vector<LeftOutRay> left_out_rays(const std::vector<FieldView>& views, const
 struct Experiment {
   const std::vector<FieldView>& views;
   std::vector<LeftOutRay> part, detail;
+  std::vector<Emitter> emitters;
+  PlaneRectangle rectangle;
 
   void row(const std::string& name, const Surroundings& s, const PenaltyOptions& penalty,
-           bool visibility = false) const {
-    print_row(name, score_of(views, s, part, penalty, visibility), score_of(views, s, detail, penalty, visibility));
+           bool visibility = true) const {
+    std::vector<ShadedEmitter> unmasked;
+    for (const Emitter& emitter : emitters) unmasked.emplace_back().emitter = emitter;
+    const EmitterBlender blender(views, s, unmasked, EmitterBlender::Lit::no);
+    const ProxyVisibility seen_past(views, s, rectangle);
+    const AnswerOptions options{penalty, visibility ? &seen_past : nullptr, &blender, {}};
+    print_row(name, score_of(views, s, part, options), score_of(views, s, detail, options));
   }
 };
 
@@ -171,7 +181,7 @@ void vary_blending(const Experiment& e, const std::string& name, const Surroundi
   for (const float resolution : {0.01F, 0.05F, 0.2F})
     e.row(fmt::format("β {} m an octave", resolution), s, {usual.k, 1, resolution, 1});
   e.row("α 0, β 1: resolution alone", s, {usual.k, 0, 1, 1});
-  e.row("visibility", s, usual, true);
+  e.row("without visibility", s, usual, false);
 }
 
 void mirror_capture(const fs::path& folder) {
@@ -186,7 +196,7 @@ void mirror_capture(const fs::path& folder) {
     if (i % every != 0) others.push_back(views[i]);
   const std::vector<Emitter> emitters = find_emitters(others);
   const Experiment e{views, left_out_rays(views, *rectangle, emitters, part_rad),
-                     left_out_rays(views, *rectangle, emitters, detail_rad)};
+                     left_out_rays(views, *rectangle, emitters, detail_rad), emitters, *rectangle};
   fmt::print("{}: {} views, {} and {} rays\n", folder.string(), views.size(), e.part.size(), e.detail.size());
   print_head("Proxies, k = 6 (plane 15)");
   e.row("plane", {}, {15, 1, 0, 1});
@@ -202,9 +212,13 @@ void mirror_capture(const fs::path& folder) {
 
 #if MF_HAVE_OPENCV
 
+// Between spaces, line ends or commas.
 std::vector<double> numbers_in(const fs::path& file) {
   std::ifstream in(file);
-  return {std::istream_iterator<double>(in), {}};
+  std::string text{std::istreambuf_iterator<char>(in), {}};
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::istringstream words(text);
+  return {std::istream_iterator<double>(words), {}};
 }
 
 // A photo as a view: pose from the homography of the board's corners. Seen in a mirror, so the frame's handedness is
@@ -295,7 +309,7 @@ void real_mirror(const fs::path& folder) {
   corner(-1, -1), corner(2, -1), corner(2, 2), corner(-1, 2);
   board.triangles = {{0, 1, 2}, {0, 2, 3}};
   const Surroundings s = mesh_surroundings({0, 0, -1}, std::make_shared<const RayScene>(board), "board");
-  Experiment e{views, {}, {}};
+  Experiment e{views, {}, {}, {}, {}};
   e.part = board_rays(views, size, 0.005F);    // medians are made alike here
   e.detail = board_rays(views, size, 0.001F);  // and are so already
   fmt::print("\n{}: {} views, {} rays; footprints of 5 and 1 mm on the board\n", folder.string(), views.size(),

@@ -111,26 +111,15 @@ TEST(RayAnswer, AViewAnswersForItsOwnRays) {
     const Eigen::Vector3f d = views[v].pixel_from_world.row(2).head<3>().normalized();
     const Eigen::Vector3f p = views[v].centre_in_world - views[v].centre_in_world.z() / d.z() * d;
     const WantedRay ray{p, d, 0.02F};
-    const RayAnswer own = answer_of(views, s, ray, {{6, 1, 0, 1}, false, {}});
+    const RayAnswer own = answer_of(views, s, ray, {{6, 1, 0, 1}, nullptr, nullptr, {}});
     ASSERT_FALSE(own.speaking.empty());
     EXPECT_EQ(own.speaking[0].view, v);
     EXPECT_GT(own.speaking[0].weight, 0.9F);
-    for (const SpeakingView& other : answer_of(views, s, ray, {{6, 1, 0, 1}, false, v}).speaking)
+    for (const SpeakingView& other : answer_of(views, s, ray, {{6, 1, 0, 1}, nullptr, nullptr, v}).speaking)
       EXPECT_NE(other.view, v);
     ++asked;
   }
   EXPECT_GT(asked, 8);
-}
-
-// A shelf hides a part of the wall from the views that look up behind it.
-TEST(RayAnswer, TheProxyHidesWhatLiesBehindIt) {
-  RoomBox box;
-  box.ceiling = 2;
-  const Surroundings s = box_surroundings({0, 0, 0}, box);
-  const ProxyPoint x(0.3F, 0, 2, 1);
-  EXPECT_FLOAT_EQ(visibility(s, {0, 0, 0}, x, {0.1F, 0, -0.8F}), 1);
-  const ProxyPoint behind(0.3F, 0, 4, 1);
-  EXPECT_FLOAT_EQ(visibility(s, {0, 0, 0}, behind, {0.1F, 0, -0.8F}), 0);
 }
 
 }  // namespace

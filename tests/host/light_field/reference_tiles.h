@@ -9,6 +9,7 @@
 #include "host/blending/view_weights.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/proxy_visibility.h"
 #include "host/light_field/view_rays.h"
 
 namespace mf::testing {
@@ -18,7 +19,11 @@ namespace mf::testing {
 class ReferenceTiles {
  public:
   ReferenceTiles(const std::vector<FieldView>& views, const LightField& field, int k)
-      : views_(views), field_(field), k_(k), weights_(static_cast<std::size_t>(k)) {}
+      : views_(views),
+        field_(field),
+        visibility_(views, field.surroundings, field.plane),
+        k_(k),
+        weights_(static_cast<std::size_t>(k)) {}
 
   [[nodiscard]] Eigen::Vector3f point(int x, int y) const {
     const Eigen::Vector2d f((x + 0.5) / field_.resolution, (y + 0.5) / field_.resolution);
@@ -40,7 +45,9 @@ class ReferenceTiles {
     ranked_.clear();
     seen_.clear();
     for (const FieldView& view : views_) {
-      const Eigen::Vector4f seen = plane ? look(view, focus) : look_at_cell(view, p, focus, parts_, direction);
+      Eigen::Vector4f seen = plane ? look(view, focus) : look_at_cell(view, p, focus, parts_, direction);
+      if (seen.w() < 0.02F) continue;
+      seen *= visibility_.of_view(static_cast<std::size_t>(&view - views_.data()), focus);
       if (seen.w() < 0.02F) continue;
       const float penalty = plane ? angle(p - view.centre_in_world, d) : ray_distance(p, focus, view.centre_in_world);
       ranked_.push_back({static_cast<std::uint32_t>(seen_.size()), penalty / seen.w()});
@@ -97,6 +104,7 @@ class ReferenceTiles {
 
   const std::vector<FieldView>& views_;
   const LightField& field_;
+  ProxyVisibility visibility_;
   int k_;
   std::size_t cell_of_ = 0;
   std::vector<CellSample> parts_;
