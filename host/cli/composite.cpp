@@ -42,6 +42,7 @@ void run(CompositeArguments& a) {
   StageSeconds stages;
   const LightSource source = open_light_source("composite", a.light, a.session, stages, progress_bar());
   check_over_plane(a, mesh, plane_of(source));
+  a.light_options.plane = LightOptions::Plane::near_object;
   const IncidentLight light = light_for(source, mesh, a.light_options, stages);
   const auto rendering = std::chrono::steady_clock::now();
   const CompositeResult r = composite(light, mesh, plate, view, {a.options}, progress_bar());

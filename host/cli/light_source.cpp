@@ -15,11 +15,13 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Without --directions a picture is as good as with the whole light field; else it is a preview.
+// Without --directions a picture is as good as with the whole light field; else it is a preview, with less care where
+// the plane's own light is not shown.
 JustInTimeOptions quality(const LightField& field, const LightOptions& options) {
   constexpr int preview_texels = 16;
   constexpr int block = 8;
-  return {options.directions == 0 ? (field.resolution + block - 1) / block * block : preview_texels};
+  if (options.directions > 0) return {preview_texels, options.plane != LightOptions::Plane::all};
+  return {(field.resolution + block - 1) / block * block, false};
 }
 
 // What each cell brings where the surroundings have no panorama: every cell has to be asked, roughly.

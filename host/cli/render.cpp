@@ -57,7 +57,7 @@ void run(RenderArguments& a) {
   StageSeconds stages;
   const LightSource source = open_light_source("render", a.light, a.session, stages, progress_bar());
   check_over_plane(a, mesh, plane_of(source));
-  a.light_options.plane = a.ground_albedo.has_value();
+  a.light_options.plane = a.ground_albedo ? LightOptions::Plane::all : LightOptions::Plane::none;
   const IncidentLight light = light_for(source, mesh, a.light_options, stages);
   const auto rendering = std::chrono::steady_clock::now();
   RenderInput input{light, mesh, view, std::nullopt};

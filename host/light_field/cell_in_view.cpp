@@ -36,7 +36,7 @@ struct Parts {
                                                const Parts& parts, LookUps& out) {
   const float end_x = static_cast<float>(image.width() + 1), end_y = static_cast<float>(image.height() + 1);
   const std::int32_t stride = image.width() + 2;
-  for (std::size_t i = 0; i < most; i += wide) {
+  for (std::size_t i = 0; i < parts.count; i += wide) {
     Floats8 dx, dy, dz, share;
     __builtin_memcpy(&dx, parts.x + i, sizeof dx);
     __builtin_memcpy(&dy, parts.y + i, sizeof dy);

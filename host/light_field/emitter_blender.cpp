@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "host/blending/view_weights.h"
 #include "host/light_field/occluder_mask.h"
+#include "host/light_field/view_ranking.h"
 #include "host/light_field/view_rays.h"
 
 namespace mf {
@@ -20,10 +22,52 @@ constexpr float ghost_reach_m = 0.12F;    // as far beside an emitter a blended 
 constexpr float smallest_weight = 0.02F;  // a view that shows less than this of the ray does not speak for it
 constexpr float same_ray_m = 1e-3F;
 
+// What is asked of views.
+struct Question {
+  const ShadedEmitter* met;  // that the ray meets; else views that show one have no say
+  Eigen::Vector3f p;
+  ProxyPoint x;
+  float angle_rad;
+};
+
 struct Answer {
   float penalty = 0;
   Eigen::Vector4f seen;  // premultiplied
 };
+
+// `distance` of the view's ray from p. Returns whether the view has a say.
+bool ask(const EmitterBlender& blender, const Question& q, const FieldView& view, float distance,
+         std::vector<Answer>& answers) {
+  if (q.met == nullptr && blender.shown_by(view, q.x, q.angle_rad)) return false;
+  const Eigen::Vector3f pixel = pixel_of(view, q.x);
+  if (pixel.z() <= 0) return false;
+  const Eigen::Vector4f seen =
+      view.fetch(level_for_angle(view, q.x, q.angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
+  if (seen.w() < smallest_weight) return false;
+  answers.push_back({distance / seen.w(), seen});
+  return true;
+}
+
+// Asks the views that pass p nearest, until no other can be among the few that speak or set their threshold: a view's
+// weight, at most 1, only adds to its penalty.
+void ask_nearest(const EmitterBlender& blender, const Question& q, const std::vector<FieldView>& views,
+                 std::span<const std::uint32_t> candidates, std::vector<Answer>& answers) {
+  thread_local std::vector<ViewPenalty> waiting;  // a heap, the nearest first
+  waiting.clear();
+  for (const std::uint32_t v : candidates) waiting.push_back({v, ray_distance(q.p, q.x, views[v].centre_in_world)});
+  const auto farther = [](const ViewPenalty& a, const ViewPenalty& b) { return ranks_before(b, a); };
+  std::make_heap(waiting.begin(), waiting.end(), farther);
+  std::array<float, most_views + 1> least;  // penalties, rising
+  least.fill(std::numeric_limits<float>::infinity());
+  while (!waiting.empty() && waiting.front().penalty < least.back()) {
+    const ViewPenalty nearest = waiting.front();
+    std::pop_heap(waiting.begin(), waiting.end(), farther);
+    waiting.pop_back();
+    if (!ask(blender, q, views[nearest.view], nearest.penalty, answers)) continue;
+    least.back() = std::min(least.back(), answers.back().penalty);
+    std::sort(least.begin(), least.end());
+  }
+}
 
 float log_luminance(const Eigen::Vector4f& seen) {
   return std::log2(std::max(shown_luminance(seen), 1e-3F));
@@ -72,8 +116,8 @@ EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surrou
 }
 
 EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
-                               std::vector<ShadedEmitter> emitters, Lit lit)
-    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)), lit_(lit) {}
+                               std::vector<ShadedEmitter> emitters, Lit lit, Asked asked)
+    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)), lit_(lit), asked_(asked) {}
 
 std::uint32_t EmitterBlender::concerned(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
                                         float angle_rad) const {
@@ -111,16 +155,13 @@ Eigen::Vector4f EmitterBlender::radiance(const ShadedEmitter* met, const Eigen::
       return {colour.x(), colour.y(), colour.z(), 1};
     }
   }
-  const ProxyPoint x = proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction));
-  for (const std::uint32_t v : candidates) {
-    const FieldView& view = views_[v];
-    if (met == nullptr && shown_by(view, x, angle_rad)) continue;
-    const Eigen::Vector3f pixel = pixel_of(view, x);
-    if (pixel.z() <= 0) continue;
-    const Eigen::Vector4f seen =
-        view.fetch(level_for_angle(view, x, angle_rad), pixel.x() / pixel.z(), pixel.y() / pixel.z());
-    if (seen.w() >= smallest_weight) answers.push_back({ray_distance(p, x, view.centre_in_world) / seen.w(), seen});
-  }
+  const Question question{met, p, proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction)),
+                          angle_rad};
+  if (asked_ == Asked::nearest)
+    ask_nearest(*this, question, views_, candidates, answers);
+  else
+    for (const std::uint32_t v : candidates)
+      ask(*this, question, views_[v], ray_distance(p, question.x, views_[v].centre_in_world), answers);
   std::array<ViewWeight, most_views> weights;
   thread_local std::vector<ViewPenalty> ranked;
   ranked.clear();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/luminance.h"
+#include "host/light_field/light_tiles.h"
 
 namespace mf {
 
@@ -97,12 +98,18 @@ HoleFiller::HoleFiller(const LightField& field) : field_(field) {
   pull_push(closed_.panorama, true, 1);
 }
 
-// p in the world.
-Eigen::Vector3f HoleFiller::guess(std::size_t direction, const Eigen::Vector3f& p) const {
+HoleFiller::Parts HoleFiller::parts_of(std::size_t direction) const {
   const Eigen::Matrix3f turn = field_.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
+  Parts parts = split_cell(field_.directions, direction, 1);
+  for (CellSample& part : parts) part.direction = turn * part.direction;
+  return parts;
+}
+
+// p in the world.
+Eigen::Vector3f HoleFiller::guess(const Parts& parts, const Eigen::Vector3f& p) const {
   Eigen::Vector4f sum = Eigen::Vector4f::Zero();
-  for (const CellSample& part : split_cell(field_.directions, direction, 1)) {
-    const Eigen::Vector3f d = turn * part.direction;
+  for (const CellSample& part : parts) {
+    const Eigen::Vector3f& d = part.direction;
     const float inverse = closed_.inverse_distance_along(p, d);
     const Eigen::Vector4f seen = closed_.panorama_at((d + inverse * (p - closed_.centre_in_world)).normalized());
     sum += part.solid_angle_sr * seen.w() * Eigen::Vector4f(seen.x(), seen.y(), seen.z(), 1);
@@ -110,7 +117,8 @@ Eigen::Vector3f HoleFiller::guess(std::size_t direction, const Eigen::Vector3f& 
   return sum.w() > 0 ? Eigen::Vector3f(sum.head<3>() / sum.w()) : Eigen::Vector3f::Zero();
 }
 
-std::size_t HoleFiller::fill(std::size_t direction, const PlaneRectangle& plane, int n, Eigen::Vector4f* tile) const {
+std::size_t HoleFiller::fill(std::size_t direction, const PlaneRectangle& plane, int n, Eigen::Vector4f* tile,
+                             int spacing) const {
   const auto texels = static_cast<std::ptrdiff_t>(n) * n;
   const auto is_hole = [](const Eigen::Vector4f& texel) { return texel.w() <= 0; };
   const auto holes = static_cast<std::size_t>(std::count_if(tile, tile + texels, is_hole));
@@ -122,13 +130,27 @@ std::size_t HoleFiller::fill(std::size_t direction, const PlaneRectangle& plane,
     std::copy(image.data.begin(), image.data.end(), tile->data());
     return holes;
   }
+  const Parts parts = parts_of(direction);
+  const auto guess_at = [&](double x, double y) {
+    return guess(parts, (plane.world_from_plane * Eigen::Vector3d(x, y, 0)).cast<float>());
+  };
+  PlaneTile guesses{plane.min_m.cast<float>(), plane.max_m.cast<float>(), 0, 0, {}};
+  if (spacing > 1) {
+    guesses.width = guesses.height = (n + spacing - 1) / spacing;
+    for (int y = 0; y < guesses.height; ++y)
+      for (int x = 0; x < guesses.width; ++x) {
+        const Eigen::Vector2d p = guesses.position(x, y).cast<double>();
+        guesses.texels.push_back(guess_at(p.x(), p.y()).homogeneous());
+      }
+  }
   const Eigen::Vector2d step = plane.size_m() / n;
   for (int y = 0; y < n; ++y)
     for (int x = 0; x < n; ++x) {
       Eigen::Vector4f& texel = tile[y * n + x];
       if (!is_hole(texel)) continue;
-      const Eigen::Vector3d p(plane.min_m.x() + (x + 0.5) * step.x(), plane.max_m.y() - (y + 0.5) * step.y(), 0);
-      texel.head<3>() = guess(direction, (plane.world_from_plane * p).cast<float>());
+      const Eigen::Vector2d p(plane.min_m.x() + (x + 0.5) * step.x(), plane.max_m.y() - (y + 0.5) * step.y());
+      texel.head<3>() =
+          spacing > 1 ? Eigen::Vector3f(sample(guesses.image(), p.cast<float>()).head<3>()) : guess_at(p.x(), p.y());
     }
   return holes;
 }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <vector>
 
 #include "common/image.h"
 #include "host/light_field/light_field.h"
@@ -28,11 +29,16 @@ class HoleFiller {
   std::size_t fill(std::size_t direction, Eigen::Vector4f* tile) const {
     return fill(direction, field_.plane, field_.resolution, tile);
   }
-  // The same for a tile of another rectangle and resolution.
-  std::size_t fill(std::size_t direction, const PlaneRectangle&, int resolution, Eigen::Vector4f* tile) const;
+  // The same for a tile of another rectangle and resolution. With a panorama, guesses for every so many texels are
+  // interpolated between: a hole is closed with means, which vary slowly. Precondition: spacing ≥ 1.
+  std::size_t fill(std::size_t direction, const PlaneRectangle&, int resolution, Eigen::Vector4f* tile,
+                   int spacing = 1) const;
 
  private:
-  [[nodiscard]] Eigen::Vector3f guess(std::size_t direction, const Eigen::Vector3f& p) const;
+  // A cell of the hemisphere, in the world.
+  using Parts = std::vector<CellSample>;
+  [[nodiscard]] Parts parts_of(std::size_t direction) const;
+  [[nodiscard]] Eigen::Vector3f guess(const Parts&, const Eigen::Vector3f& p) const;
 
   const LightField& field_;
   Surroundings closed_;  // the panorama without holes; its weight 1 everywhere, or 0 when nothing was seen at all

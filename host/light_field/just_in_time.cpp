@@ -22,6 +22,8 @@ namespace {
 // glare beside one, which it takes to reach 12 cm.
 constexpr float coarsest_texel_m = 0.05F;
 
+constexpr int rough_guess_spacing = 4;  // texels from one guess to the next, where no view saw anything
+
 int whole_blocks(float texels) {
   return block_side * std::max(1, static_cast<int>(std::ceil(texels / static_cast<float>(block_side))));
 }
@@ -56,14 +58,15 @@ PlaneTile even_tile(const Rectangle& r, int texels) {
 class Worker {
  public:
   Worker(const std::vector<FieldView>& views, const LightField& focused, const ProxyVisibility& visibility,
-         const EmitterBlender& emitters, const HoleFiller& filler, const PenaltyOptions& penalty, int most_texels)
+         const EmitterBlender& emitters, const HoleFiller& filler, const PenaltyOptions& penalty,
+         const JustInTimeOptions& options)
       : views_(views),
         focused_(focused),
         visibility_(visibility),
         emitters_(emitters),
         filler_(filler),
         penalty_(penalty),
-        most_texels_(most_texels) {
+        options_(options) {
     part_.directions = focused.directions;
     part_.surroundings = focused.surroundings;
     part_.surroundings.panorama = {};
@@ -75,13 +78,14 @@ class Worker {
     PlaneTile tile = even_tile(where, part_.resolution);
     of_cell_ = tile;
     part_.plane = {focused_.plane.world_from_plane, tile.min_m.cast<double>(), tile.max_m.cast<double>()};
-    TileResampler resampler(views_, part_, visibility_, emitters_, penalty_);
+    TileResampler resampler(views_, part_, visibility_, emitters_, penalty_, options_.rough ? 0 : 1);
     float solid_angle = 0;
     for (const std::uint32_t cell : request.cells) solid_angle += part_.directions.solid_angles_sr[cell];
     for (const std::uint32_t cell : request.cells) {
       const float share = part_.directions.solid_angles_sr[cell] / solid_angle;
       resampler.fill(cell, of_cell_.texels.data());
-      filler_.fill(cell, part_.plane, part_.resolution, of_cell_.texels.data());
+      filler_.fill(cell, part_.plane, part_.resolution, of_cell_.texels.data(),
+                   options_.rough ? rough_guess_spacing : 1);
       for (std::size_t t = 0; t < tile.texels.size(); ++t) tile.texels[t] += share * of_cell_.texels[t];
     }
     return tile;
@@ -93,7 +97,7 @@ class Worker {
     const Eigen::Vector2f part = (r.max_m - r.min_m).cwiseQuotient(focused_.plane.size_m().cast<float>());
     const int as_field = whole_blocks(part.maxCoeff() * static_cast<float>(focused_.resolution));
     const int fewest = whole_blocks((r.max_m - r.min_m).maxCoeff() / coarsest_texel_m);
-    return std::min(as_field, std::max(fewest, most_texels_));
+    return std::min(as_field, std::max(fewest, options_.most_texels));
   }
 
   const std::vector<FieldView>& views_;
@@ -102,7 +106,7 @@ class Worker {
   const EmitterBlender& emitters_;
   const HoleFiller& filler_;
   PenaltyOptions penalty_;
-  int most_texels_;
+  JustInTimeOptions options_;
   LightField part_;
   PlaneTile of_cell_;  // what the cell at hand shows; w: confidence
 };
@@ -152,10 +156,11 @@ std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views
   if (focused.surroundings.is_plane()) return over_the_plane(views, focused, penalty.k, requests, options.most_texels);
   const ProxyVisibility visibility(views, focused.surroundings, focused.plane);
   // Emitters are black here, and views that show their glare have no say.
-  const EmitterBlender emitters(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no);
+  const EmitterBlender emitters(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no,
+                                options.rough ? EmitterBlender::Asked::nearest : EmitterBlender::Asked::all);
   const HoleFiller filler(focused);
   tbb::enumerable_thread_specific<Worker> workers(
-      [&] { return Worker(views, focused, visibility, emitters, filler, penalty, options.most_texels); });
+      [&] { return Worker(views, focused, visibility, emitters, filler, penalty, options); });
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(),
                     [&](std::size_t i) { tiles[i] = workers.local().fill(requests[i]); });

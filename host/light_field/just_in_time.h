@@ -15,6 +15,10 @@ struct JustInTimeOptions {
   // would be larger than 5 cm). What comes from far off varies slowly over the plane, and small bright sources are left
   // out: so a preview needs few. A multiple of 8, at least 8.
   int most_texels = 8;
+  // Takes less care of what a mean over many cells hides: a cell is fetched from a view in 6 parts instead of the 12 of
+  // a light field's tile, of what no view saw every fourth texel is guessed, and beside emitters only the views nearest
+  // to a ray are asked. It costs two thirds of the time.
+  bool rough = false;
 };
 
 // The light of some cells over some parts of the plane, straight from the views: what merged_tiles makes of the whole

@@ -34,20 +34,24 @@ Eigen::Vector2f ShadedEmitter::mask_texel(const Eigen::Vector3f& p, const Eigen:
 
 // The share depends on where the ray passes, and that on the share: a fixed point, near at once since shares vary
 // slowly and rays to one small emitter lie close together.
-float ShadedEmitter::share_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
-  if (mask.empty()) return occluder_share;
-  float share = occluder_share;
+ShadedEmitter::Passage ShadedEmitter::passage(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
+  Passage at{occluder_share, mask_texel(p, direction, occluder_share)};
   constexpr int rounds = 3;
   for (int i = 0; i < rounds; ++i) {
-    const Eigen::Vector2f at = mask_texel(p, direction, share);
-    share = mask.at(static_cast<int>(at.x()), static_cast<int>(at.y()), 2);
+    const float share = mask.at(static_cast<int>(at.texel.x()), static_cast<int>(at.texel.y()), 2);
+    if (share == at.share) break;
+    at = {share, mask_texel(p, direction, share)};
   }
-  return share;
+  return at;
+}
+
+float ShadedEmitter::share_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
+  return mask.empty() ? occluder_share : passage(p, direction).share;
 }
 
 std::optional<float> ShadedEmitter::visibility(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {
   if (mask.empty()) return std::nullopt;
-  const Eigen::Vector2f at = mask_texel(p, direction, share_along(p, direction)).array() - 0.5F;
+  const Eigen::Vector2f at = passage(p, direction).texel.array() - 0.5F;
   const float x = at.x(), y = at.y();
   const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
   const int x1 = std::min(x0 + 1, mask.width - 1), y1 = std::min(y0 + 1, mask.height - 1);

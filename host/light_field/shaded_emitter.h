@@ -53,6 +53,12 @@ struct ShadedEmitter {
   [[nodiscard]] Eigen::Vector3f occluder_point(const Eigen::Vector2f& m, float share) const;
 
  private:
+  struct Passage {
+    float share;
+    Eigen::Vector2f texel;  // of the mask
+  };
+  // Where the ray passes the occluder. Precondition: there is a mask.
+  [[nodiscard]] Passage passage(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const;
   // Where the ray passes an occluder at `share`, as a position in texels of the mask (centres at +0.5), inside it.
   [[nodiscard]] Eigen::Vector2f mask_texel(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
                                            float share) const;

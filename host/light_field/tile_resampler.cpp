@@ -13,7 +13,6 @@ namespace {
 constexpr int block_vertices = block_side / vertex_step;
 constexpr std::size_t spare_views = 2;  // ranked beyond k, so that the k best of any texel are among its corners' lists
 constexpr std::size_t spare_views_near_emitter = 26;  // there many views have no say
-constexpr int cell_splits = 1;                        // a cell is fetched in 6 · 2¹ parts
 constexpr float same_ray = 1e-4F;                     // rays closer than this are the same
 constexpr float largest_jump = 0.3F;                  // of the cell, see is_rough()
 constexpr float largest_bend = 0.2F;                  // of what is seen, see is_smooth()
@@ -30,7 +29,7 @@ Lanes all_lanes(float value) {
 
 TileResampler::TileResampler(const std::vector<FieldView>& views, const LightField& field,
                              const ProxyVisibility& visibility, const EmitterBlender& emitters,
-                             const PenaltyOptions& penalty)
+                             const PenaltyOptions& penalty, int cell_splits)
     : views_(views),
       field_(field),
       visibility_(visibility),
@@ -38,6 +37,7 @@ TileResampler::TileResampler(const std::vector<FieldView>& views, const LightFie
       sieve_(views),
       grid_(field.plane, field.resolution),
       penalty_(penalty),
+      cell_splits_(cell_splits),
       blocks_((field.resolution + block_side - 1) / block_side),
       vertices_(blocks_ * block_vertices + 1),
       vertex_(static_cast<std::size_t>(vertices_ * vertices_)),
@@ -67,7 +67,7 @@ void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
 void TileResampler::prepare(std::size_t i) {
   const Eigen::Matrix3f world_from_plane = field_.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
   cell_.direction = world_from_plane * field_.directions.directions[i];
-  cell_.parts = split_cell(field_.directions, i, cell_splits);
+  cell_.parts = split_cell(field_.directions, i, cell_splits_);
   for (CellSample& part : cell_.parts) part.direction = world_from_plane * part.direction;
   cell_.angle_rad = std::sqrt(field_.directions.solid_angles_sr[i]);
   cell_.part_angle_rad = cell_.angle_rad / std::sqrt(static_cast<float>(cell_.parts.size()));

@@ -29,9 +29,10 @@ namespace mf {
 // every texel. One resampler a thread: it holds the working memory.
 class TileResampler {
  public:
-  // Keeps references to all; `field` has everything but its texels.
+  // Keeps references to all; `field` has everything but its texels. A direction's cell is fetched in 6 · 2^cell_splits
+  // parts; 0 or 1.
   TileResampler(const std::vector<FieldView>& views, const LightField& field, const ProxyVisibility&,
-                const EmitterBlender&, const PenaltyOptions&);
+                const EmitterBlender&, const PenaltyOptions&, int cell_splits = 1);
 
   // Precondition: `tile` holds resolution² texels.
   void fill(std::size_t direction, Eigen::Vector4f* tile);
@@ -108,6 +109,7 @@ class TileResampler {
   ViewSieve sieve_;
   TexelGrid grid_;
   PenaltyOptions penalty_;
+  int cell_splits_;
   int blocks_;    // along a side
   int vertices_;  // along a side
 

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "common/check.h"
 
@@ -60,21 +61,35 @@ Rectangle seen_through(const Bounds& box, const Eigen::Vector3f& centre, float r
   return (part.high.array() > part.low.array()).all() ? part : all;
 }
 
-// What the emitter's point shows of itself to the plane: its radiance through the mask; black without a mask.
-PlaneTile seen_on_plane(const ShadedEmitter& e, const Rectangle& where, const Eigen::Vector2f& mask_texel_m,
-                        const Rigid3& world_from_plane, const Eigen::Vector3f& point_in_world) {
+// A black tile with texels as fine as the mask's.
+PlaneTile empty_tile(const Rectangle& where, const Eigen::Vector2f& mask_texel_m) {
   const Eigen::Array2f texels = ((where.high - where.low).array() / mask_texel_m.array()).ceil().max(2.F);
   PlaneTile tile{where.low, where.high, static_cast<int>(texels.x()), static_cast<int>(texels.y()), {}};
+  tile.texels.assign(tile.image().texel_count(), Eigen::Vector4f::Zero());
+  return tile;
+}
+
+// The middles of a tile's texels, in the world.
+std::vector<Eigen::Vector3f> texels_in_world(const PlaneTile& tile, const Rigid3& world_from_plane) {
+  std::vector<Eigen::Vector3f> positions;
+  positions.reserve(tile.texels.size());
   for (int y = 0; y < tile.height; ++y)
     for (int x = 0; x < tile.width; ++x) {
       const Eigen::Vector2f at = tile.position(x, y);
-      const Eigen::Vector3f p =
+      positions.emplace_back(
           (world_from_plane * Eigen::Vector3d(static_cast<double>(at.x()), static_cast<double>(at.y()), 0))
-              .cast<float>();
-      const Eigen::Vector3f seen = e.visibility(p, (point_in_world - p).normalized()).value_or(0) * e.radiance;
-      tile.texels.emplace_back(seen.x(), seen.y(), seen.z(), 0);
+              .cast<float>());
     }
-  return tile;
+  return positions;
+}
+
+// What the emitter's point shows of itself to the plane: its radiance through the mask; black without a mask.
+void see_on_plane(const ShadedEmitter& e, const Eigen::Vector3f& point_in_world,
+                  std::span<const Eigen::Vector3f> texels_in_world, PlaneTile& tile) {
+  for (std::size_t i = 0; i < tile.texels.size(); ++i) {
+    const Eigen::Vector3f& p = texels_in_world[i];
+    tile.texels[i].head<3>() = e.visibility(p, (point_in_world - p).normalized()).value_or(0) * e.radiance;
+  }
 }
 
 }  // namespace
@@ -92,6 +107,8 @@ EmitterLights emitter_lights(const LightField& field, const Bounds& object_in_pl
     const Eigen::Vector2f texel =
         (all.high - all.low)
             .cwiseQuotient(Eigen::Vector2f(static_cast<float>(e.mask.width), static_cast<float>(e.mask.height)));
+    const PlaneTile black = empty_tile(where, texel);
+    const std::vector<Eigen::Vector3f> positions = texels_in_world(black, world_from_plane);
     const std::size_t first = lights.tiles.size();
     for (const Eigen::Vector3f& p : points_on_disc(centre, e.emitter.radius_m, object_in_plane.centre, points)) {
       lights.points.push_back({p, centre, e.emitter.radius_m, 1 / static_cast<float>(points),
@@ -100,7 +117,8 @@ EmitterLights emitter_lights(const LightField& field, const Bounds& object_in_pl
     }
     tbb::parallel_for(first, lights.tiles.size(), [&](std::size_t i) {
       const Eigen::Vector3f in_world = (world_from_plane * lights.points[i].position.cast<double>()).cast<float>();
-      lights.tiles[i] = seen_on_plane(e, where, texel, world_from_plane, in_world);
+      lights.tiles[i] = black;
+      see_on_plane(e, in_world, positions, lights.tiles[i]);
     });
   }
   return lights;

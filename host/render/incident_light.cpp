@@ -23,6 +23,25 @@ std::vector<double> light_in(const LightField& field, std::span<const PlaneImage
   return light_of_tiles(field.directions, dark);
 }
 
+// The object's box with the ground beneath it.
+Bounds with_its_ground(const Bounds& object_in_plane) {
+  Bounds box = object_in_plane;
+  box.low.z() = std::min(box.low.z(), 0.F);
+  return box;
+}
+
+// Near the object the plane's light counts beneath it and where its shadows fall. A preview asks for no more; beside
+// that what each direction's tile has at its rim holds on.
+std::vector<TileRequest> tiles_for(const DirectionSet& set, std::span<const CellGroup> groups,
+                                   const Bounds& object_in_plane, const PlaneRectangle& rectangle,
+                                   const LightOptions& options) {
+  using Plane = LightOptions::Plane;
+  if (options.plane == Plane::none) return tiles_for_object(set, groups, object_in_plane);
+  if (options.plane == Plane::near_object && options.directions > 0)
+    return tiles_for_object(set, groups, with_its_ground(object_in_plane));
+  return tiles_for_plane(groups, rectangle);
+}
+
 // How many points each emitter gets: in a preview a share of the picture's directions.
 int points_of_emitters(const LightOptions& options) {
   constexpr int share = 4, fewest = 16;
@@ -38,11 +57,11 @@ void assemble(const LightField& field, const Bounds& object_in_plane, const Ligh
   light.plane = field.plane;
   light.for_bounce = make_light_set(set, same ? plan.groups : plan.bounce_groups, same ? of_groups : of_bounce, {0, 1});
   light.from_above = make_light_set(set, plan.groups, std::move(of_groups), options.importance);
-  if (options.plane) light.bare = bare_irradiance(light.from_above);
+  const bool plane = options.plane != LightOptions::Plane::none;
+  if (plane) light.bare = bare_irradiance(light.from_above);
   const int points = points_of_emitters(options);
-  light.emitters = emitter_lights(field, object_in_plane, options.plane, points);
-  light.emitters_for_bounce =
-      emitter_lights(field, object_in_plane, options.plane, std::min(points, bounce_emitter_points));
+  light.emitters = emitter_lights(field, object_in_plane, plane, points);
+  light.emitters_for_bounce = emitter_lights(field, object_in_plane, plane, std::min(points, bounce_emitter_points));
   append_emitters(light.from_above, light.emitters);
   append_emitters(light.for_bounce, light.emitters_for_bounce);
 }
@@ -61,8 +80,7 @@ LightPlan plan_light(const DirectionSet& set, std::span<const double> light, con
   plan.groups = group_cells(set, light, options.directions > 0 ? options.directions : cells);
   if (plan.groups.size() > bounce_directions) plan.bounce_groups = group_cells(set, light, bounce_directions);
   for (const std::vector<CellGroup>* groups : {&plan.groups, &plan.bounce_groups})
-    for (TileRequest& request :
-         options.plane ? tiles_for_plane(*groups, rectangle) : tiles_for_object(set, *groups, object_in_plane))
+    for (TileRequest& request : tiles_for(set, *groups, object_in_plane, rectangle, options))
       plan.requests.push_back(std::move(request));
   return plan;
 }

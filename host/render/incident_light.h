@@ -42,7 +42,10 @@ struct LightOptions {
   // Into how many groups the hemisphere's cells are taken, the important parts finely; 0: every cell by itself.
   int directions = 0;
   ImportanceOptions importance;
-  bool plane = true;  // the plane is in the picture, or lights the object: its own irradiance is needed
+  // What is needed of the plane's own irradiance: nothing, when only the object is lit; what it is where the object
+  // changes it, beside a plate that shows the rest; or all of it, when the plane is in the picture.
+  enum class Plane { none, near_object, all };
+  Plane plane = Plane::all;
 
   [[nodiscard]] std::optional<std::string> validate() const;
 };

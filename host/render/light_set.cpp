@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "common/check.h"
@@ -35,6 +36,27 @@ std::vector<float> weights_on_plane(const LightSet& set) {
   for (const DirectionalLight& light : set.lights)
     weights[light.image] += std::max(0.F, light.direction.z()) * light.solid_angle_sr;
   return weights;
+}
+
+// Over the images of all parallel lights, as fine as the finest of them; but of no more than 64 texels a side, or as
+// many as one of them has.
+PlaneTile empty_tile_over(const LightSet& set) {
+  constexpr float beyond = std::numeric_limits<float>::max();
+  PlaneTile tile{Eigen::Vector2f::Constant(beyond), Eigen::Vector2f::Constant(-beyond), 0, 0, {}};
+  Eigen::Vector2f texel = Eigen::Vector2f::Constant(beyond), most = Eigen::Vector2f::Constant(64);
+  for (const DirectionalLight& light : set.lights) {
+    const PlaneImage& image = set.images[light.image];
+    const Eigen::Vector2f texels(static_cast<float>(image.width), static_cast<float>(image.height));
+    tile.min_m = tile.min_m.cwiseMin(image.min_m);
+    tile.max_m = tile.max_m.cwiseMax(image.max_m);
+    texel = texel.cwiseMin((image.max_m - image.min_m).cwiseQuotient(texels));
+    most = most.cwiseMax(texels);
+  }
+  const Eigen::Vector2f texels = (tile.max_m - tile.min_m).cwiseQuotient(texel).cwiseMin(most);
+  tile.width = static_cast<int>(std::lround(texels.x()));
+  tile.height = static_cast<int>(std::lround(texels.y()));
+  tile.texels.assign(tile.image().texel_count(), Eigen::Vector4f::Zero());
+  return tile;
 }
 
 bool same_grid(const PlaneImage& a, const PlaneImage& b) {
@@ -76,20 +98,15 @@ LightSet make_light_set(const LightField& field, const ImportanceOptions& option
 }
 
 PlaneTile bare_irradiance(const LightSet& set) {
-  const auto texels = [&](const DirectionalLight& light) { return set.images[light.image].texel_count(); };
-  const auto finest = std::max_element(set.lights.begin(), set.lights.end(),
-                                       [&](const auto& a, const auto& b) { return texels(a) < texels(b); });
-  if (finest == set.lights.end()) return {};
-  const PlaneImage* largest = &set.images[finest->image];
-  PlaneTile sum{largest->min_m, largest->max_m, largest->width, largest->height, {}};
-  sum.texels.assign(largest->texel_count(), Eigen::Vector4f::Zero());
+  if (set.lights.empty()) return {};
+  PlaneTile sum = empty_tile_over(set);
   const std::vector<float> weights = weights_on_plane(set);
   tbb::parallel_for(0, sum.height, [&](int y) {
     Eigen::Vector4f* row = sum.texels.data() + static_cast<std::ptrdiff_t>(y) * sum.width;
     for (std::size_t i = 0; i < set.images.size(); ++i) {
       if (weights[i] == 0) continue;
       const PlaneImage& image = set.images[i];
-      const bool same = same_grid(image, *largest);
+      const bool same = same_grid(image, sum.image());
       const Eigen::Vector4f* same_row = image.texels + static_cast<std::ptrdiff_t>(y) * sum.width;
       for (int x = 0; x < sum.width; ++x)
         row[x] += weights[i] * (same ? same_row[x] : sample(image, sum.position(x, y)));

@@ -74,8 +74,8 @@ struct ImportanceOptions {
 // A whole light field, every cell a group, by the light that its tiles hold.
 [[nodiscard]] LightSet make_light_set(const LightField&, const ImportanceOptions&);
 
-// Irradiance of the bare plane under the set's parallel lights, over the rectangle and as finely as their largest
-// image: E(p) = Σ image(p) ω_z ΔΩ. An empty set has none.
+// Irradiance of the bare plane under the set's parallel lights, over all of their images, as finely as they are but
+// with at most 64 texels a side, or as many as one of them has: E(p) = Σ image(p) ω_z ΔΩ. An empty set has none.
 [[nodiscard]] PlaneTile bare_irradiance(const LightSet&);
 
 // That of its emitters' points, at one point of the plane.

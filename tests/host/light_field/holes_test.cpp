@@ -101,6 +101,28 @@ TEST(Holes, ProbesShowTheGuessWithoutConfidence) {
   EXPECT_GT(probe.radiance.at(32, 13, 0), 0.8F);
 }
 
+// Guesses are means, which vary slowly: one for every fourth texel does, and what is known stays.
+TEST(Holes, GuessesMayBeInterpolated) {
+  ResampleOptions options;
+  options.directions = 400;
+  options.proxy = "sphere:1.2";
+  const auto views = views_with_a_hole();
+  const LightField field = Resampling(views, square, options, Team(), Progress()).field();
+  const HoleFiller filler(field);
+  constexpr int n = 16;
+  const Eigen::Vector4f known(5, 5, 5, 1);
+  for (std::size_t i = 0; i < field.directions.size(); ++i) {
+    std::vector<Eigen::Vector4f> every(n * n, Eigen::Vector4f::Zero());
+    every[n + 3] = known;
+    std::vector<Eigen::Vector4f> fourth = every;
+    EXPECT_EQ(filler.fill(i, square, n, every.data()), every.size() - 1);
+    EXPECT_EQ(filler.fill(i, square, n, fourth.data(), 4), every.size() - 1);
+    EXPECT_EQ(fourth[n + 3], known);
+    for (std::size_t t = 0; t < every.size(); ++t)
+      EXPECT_LT((fourth[t] - every[t]).norm(), 0.03F * every[t].norm()) << i << ' ' << t;
+  }
+}
+
 // The plane proxy knows no panorama: a tile is closed by itself.
 TEST(Holes, ThePlaneClosesItsTiles) {
   const auto views = testing::analytic_views(2, 0.1F, 48, sky);

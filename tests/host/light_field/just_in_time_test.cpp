@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 
+#include "host/light_field/emitter_blender.h"
 #include "host/light_field/emitter_light.h"
 #include "host/light_field/resample.h"
 #include "tests/host/light_field/synthetic_views.h"
@@ -47,8 +49,8 @@ class JustInTime : public ::testing::Test {
     delete whole_;
   }
 
-  static std::vector<PlaneTile> tiles(const std::vector<TileRequest>& requests, int most_texels) {
-    return resample_just_in_time(*views_, *focused_, penalty_, requests, {most_texels});
+  static std::vector<PlaneTile> tiles(const std::vector<TileRequest>& requests, int most_texels, bool rough = false) {
+    return resample_just_in_time(*views_, *focused_, penalty_, requests, {most_texels, rough});
   }
 
   // Light of all requests at p: Σ tile(p) · solid angle of its cells.
@@ -122,14 +124,41 @@ TEST_F(JustInTime, DarkTilesLackTheLampAndNothingElse) {
 TEST_F(JustInTime, APreviewOfAPartOfThePlaneBringsTheSameLight) {
   const Eigen::Vector2f low(-0.05F, 0.02F), high(0.06F, 0.15F);
   const auto requests = runs_of_cells(whole_->directions.size(), low, high);
-  const auto ours = tiles(requests, 8), field = merged_tiles(whole_->directions, dark_->images, requests);
-  EXPECT_LE(ours.back().texels.size(), 64U);  // beside the lamp
-  for (const float u : {0.F, 0.3F, 0.6F, 1.F})
-    for (const float v : {0.F, 0.5F, 1.F}) {
-      const Eigen::Vector2f p = low + Eigen::Vector2f(u, v).cwiseProduct(high - low);
-      const Eigen::Vector3f expected = light_at(field, requests, p);
-      EXPECT_LT((light_at(ours, requests, p) - expected).norm(), 0.01F * expected.norm()) << p.transpose();
-    }
+  const auto field = merged_tiles(whole_->directions, dark_->images, requests);
+  for (const bool rough : {false, true}) {
+    const auto ours = tiles(requests, 8, rough);
+    EXPECT_LE(ours.back().texels.size(), 64U);  // beside the lamp
+    for (const float u : {0.F, 0.3F, 0.6F, 1.F})
+      for (const float v : {0.F, 0.5F, 1.F}) {
+        const Eigen::Vector2f p = low + Eigen::Vector2f(u, v).cwiseProduct(high - low);
+        const Eigen::Vector3f expected = light_at(field, requests, p);
+        EXPECT_LT((light_at(ours, requests, p) - expected).norm(), 0.01F * expected.norm())
+            << rough << " at " << p.transpose();
+      }
+  }
+}
+
+// Views that pass a ray too far off to speak for it need not be asked.
+TEST_F(JustInTime, TheNearestViewsAnswerForAll) {
+  using Asked = EmitterBlender::Asked;
+  const Surroundings& s = focused_->surroundings;
+  const EmitterBlender all(*views_, s, focused_->emitters, EmitterBlender::Lit::no);
+  const EmitterBlender nearest(*views_, s, focused_->emitters, EmitterBlender::Lit::no, Asked::nearest);
+  std::vector<std::uint32_t> candidates(views_->size());
+  std::iota(candidates.begin(), candidates.end(), 0U);
+  int answered = 0;
+  for (int i = 0; i < 400; ++i) {  // beside the lamp, and across it
+    const Eigen::Vector3f p(-0.18F + 0.018F * static_cast<float>(i % 20), 0.05F, 0);
+    const Eigen::Vector3f at = focused_->emitters.front().emitter.position +
+                               Eigen::Vector3f(-0.2F + 0.02F * static_cast<float>(i / 20), 0.01F, 0);
+    const Eigen::Vector3f d = (at - p).normalized();
+    const ShadedEmitter* met = emitter_met(focused_->emitters, p, d);
+    const Eigen::Vector4f expected = all.radiance(met, p, d, 0.02F, candidates);
+    const Eigen::Vector4f answer = nearest.radiance(met, p, d, 0.02F, candidates);
+    EXPECT_LE((answer - expected).norm(), 1e-5F * expected.norm()) << i;
+    answered += expected.head<3>().norm() > 0 ? 1 : 0;
+  }
+  EXPECT_GT(answered, 200);
 }
 
 // Of cells beside the lamp: where it covers a good part of one, the black that it leaves moves fast over the plane.

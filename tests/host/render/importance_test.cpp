@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "host/render/incident_light.h"
 #include "host/render/irradiance.h"
 #include "host/tracing/ray_scene.h"
@@ -95,6 +97,61 @@ TEST(IncidentLight, OfFewDirectionsLightsSurfacesAsAllDo) {
   };
   const auto all = sums(0), few = sums(200);
   for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(few[i].x() / all[i].x(), 1, 0.02) << i;
+}
+
+// Of light that comes in tiles of different places and sizes, as a preview's do.
+TEST(IncidentLight, TheBarePlaneSumsWhatEachTileHolds) {
+  std::vector<PlaneTile> tiles;
+  for (int i = 0; i < 12; ++i) {
+    const auto shift = 0.02F * static_cast<float>(i);
+    PlaneTile tile{{-0.3F + shift, -0.2F}, {0.1F + shift, 0.3F - shift}, 16, i % 2 == 0 ? 16 : 24, {}};
+    for (int y = 0; y < tile.height; ++y)
+      for (int x = 0; x < tile.width; ++x) {
+        const Eigen::Vector2f p = tile.position(x, y);
+        tile.texels.emplace_back(1 + p.x(), 1 + std::sin(6 * p.y()), 2, 0);
+      }
+    tiles.push_back(std::move(tile));
+  }
+  const DirectionSet set = geodesic_hemisphere(100);
+  const std::vector<CellGroup> groups = group_cells(set, std::vector<double>(set.size(), 1), 12);
+  std::vector<PlaneImage> images;
+  for (const PlaneTile& tile : tiles) images.push_back(tile.image());
+  const PlaneTile bare = bare_irradiance(make_light_set(set, groups, images, {0, 1}));
+  for (const float x : {-0.35F, -0.25F, 0.F, 0.12F, 0.4F})
+    for (const float y : {-0.25F, -0.1F, 0.04F, 0.2F, 0.35F}) {
+      Eigen::Vector3f expected = Eigen::Vector3f::Zero();
+      for (std::size_t i = 0; i < groups.size(); ++i)
+        expected += groups[i].direction.z() * groups[i].solid_angle_sr * sample(images[i], {x, y}).head<3>();
+      const Eigen::Vector3f sum = sample(bare.image(), {x, y}).head<3>();
+      EXPECT_LT((sum - expected).norm(), 0.003F * expected.norm()) << x << ' ' << y;
+    }
+}
+
+// A composite's preview needs the plane beneath the object and where its shadows fall.
+TEST(IncidentLight, APreviewAsksForThePlaneNearTheObject) {
+  using Plane = LightOptions::Plane;
+  const LightField field = lamp_and_sky();
+  const std::vector<double> light = light_of_tiles(field.directions, images_of(field));
+  const Bounds box{{0.1F, 0, 0.05F}, {0.2F, 0.1F, 0.25F}, {0.15F, 0.05F, 0.15F}, 0.13F};
+  for (const auto& [directions, plane] :
+       {std::pair(0, Plane::near_object), std::pair(200, Plane::near_object), std::pair(200, Plane::all)}) {
+    LightOptions options;
+    options.directions = directions;
+    options.plane = plane;
+    const LightPlan plan = plan_light(field.directions, light, box, field.plane, options);
+    for (std::size_t i = 0; i < plan.groups.size(); ++i) {
+      const TileRequest& request = plan.requests[i];
+      const Eigen::Vector3f& w = plan.groups[i].direction;
+      const Eigen::Vector2f shadow = box.high.head<2>() - w.head<2>() * (box.high.z() / w.z());
+      for (const Eigen::Vector2f& p : {Eigen::Vector2f(0.1F, 0), Eigen::Vector2f(0.2F, 0.1F), shadow}) {
+        if ((p.array().abs() > 0.5F).any()) continue;  // beyond the rectangle
+        EXPECT_TRUE((p.array() >= request.min_m.array() - 1e-5F).all()) << i;
+        EXPECT_TRUE((p.array() <= request.max_m.array() + 1e-5F).all()) << i;
+      }
+      const bool whole = (request.min_m.array() <= -0.5F).all() && (request.max_m.array() >= 0.5F).all();
+      EXPECT_EQ(whole, directions == 0 || plane == Plane::all) << i;
+    }
+  }
 }
 
 // One light may come from far off the object: what lines through its box along the light meet, is asked for.
