@@ -284,7 +284,11 @@ std::vector<LeftOutRay> board_rays(std::vector<FieldView>& views, const Eigen::V
     const float median = middle->log2_seen, gain = std::exp2(-median);
     for (PremultipliedImage& level : views[v].levels)
       for (int y = 0; y < level.height(); ++y)
-        for (int x = 0; x < level.width(); ++x) level.at(x, y).head<3>() *= gain;
+        for (int x = 0; x < level.width(); ++x) {
+          Eigen::Vector4f texel = level.at(x, y);
+          texel.head<3>() *= gain;
+          level.set(x, y, texel);
+        }
     for (LeftOutRay& ray : own) {
       ray.log2_seen -= median;
       rays.push_back(ray);
