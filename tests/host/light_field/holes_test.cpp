@@ -111,6 +111,7 @@ TEST(Holes, GuessesMayBeInterpolated) {
   const HoleFiller filler(field);
   constexpr int n = 16;
   const Eigen::Vector4f known(5, 5, 5, 1);
+  int far_off = 0;
   for (std::size_t i = 0; i < field.directions.size(); ++i) {
     std::vector<Eigen::Vector4f> every(n * n, Eigen::Vector4f::Zero());
     every[n + 3] = known;
@@ -118,9 +119,13 @@ TEST(Holes, GuessesMayBeInterpolated) {
     EXPECT_EQ(filler.fill(i, square, n, every.data()), every.size() - 1);
     EXPECT_EQ(filler.fill(i, square, n, fourth.data(), 4), every.size() - 1);
     EXPECT_EQ(fourth[n + 3], known);
-    for (std::size_t t = 0; t < every.size(); ++t)
-      EXPECT_LT((fourth[t] - every[t]).norm(), 0.03F * every[t].norm()) << i << ' ' << t;
+    for (std::size_t t = 0; t < every.size(); ++t) {
+      const float off = (fourth[t] - every[t]).norm() / every[t].norm();
+      EXPECT_LT(off, 0.1F) << i << ' ' << t;
+      far_off += off > 0.03F ? 1 : 0;
+    }
   }
+  EXPECT_LT(far_off, static_cast<int>(field.directions.size() * n * n / 100));
 }
 
 // The plane proxy knows no panorama: a tile is closed by itself.
