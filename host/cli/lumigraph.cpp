@@ -127,9 +127,10 @@ Picture difference_of(const Picture& a, const Picture& b, const ImageU8& where) 
 
 void run_leave_one_out(const LumigraphArguments& a, const PhotoSet& set, const FrameRenderer& renderer,
                        std::chrono::steady_clock::time_point start) {
+  const LumigraphOptions options = options_of(a, set);
   if (!a.output.empty()) make_folder(a.output);
   const LeaveOneOut result = leave_one_out(
-      renderer, set, options_of(a, set),
+      renderer, set, options,
       [&](const LeftOutView& view, const LeftOutPictures& pictures) {
         if (a.output.empty()) return;
         const fs::path stem = a.output / fs::path(view.name).filename().stem();
