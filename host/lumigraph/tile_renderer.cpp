@@ -18,6 +18,7 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr int bundle_side = 8;        // pixels
 constexpr std::size_t samples = 16;   // rays that stand for a tile when its bound is guessed
 constexpr float bound_slack = 1.03F;  // on the guess: fewer rays are ranked twice
+constexpr float first_step = 1.5F;    // from the tile's bound to the next; the further ones are its powers
 constexpr float same_ray = 1e-6F;     // radians: what single precision leaves of an angle of 0
 static_assert(bundle_side * bundle_side <= largest_bundle);
 
@@ -84,7 +85,7 @@ TileRenderer::TileRenderer(const TileFrame& frame, TileBuffers& buffers, const T
   buffers.least_candidate.resize(entries);
   buffers.chosen_weight.resize(entries);
   buffers.pixel.resize(largest_bundle);
-  buffers.ranked_for.resize(frame.views.size());
+  buffers.told.resize(frame.views.size());
 }
 
 void TileRenderer::render(int x0, int y0) {
@@ -210,11 +211,14 @@ void TileRenderer::rank_all(const ViewTable& table, const RaysBox& box, float bo
   const RaysCorners corners = corners_of(box, axes_);
   for (std::size_t i = 0; i < table.size(); ++i) {
     const float reach = std::min(worst_.largest, bound);
+    if (!(b.least[i] < reach)) continue;
     const std::uint32_t view = table.numbers()[i];
-    if (!(b.least[i] < reach) || b.ranked_for[view] == b.rankings) continue;
-    const float weight = largest_weight(frame_.views[view], corners, frame_.depth_tolerance);
-    const float least = of_weight(b.least[i], weight, frame_.options.penalty.border);
-    if (least < reach) rank(view, least);
+    ToldOfPhoto& told = b.told[view];
+    if (told.ranking != b.rankings) {
+      const float weight = largest_weight(frame_.views[view], corners, frame_.depth_tolerance);
+      told = {b.rankings, of_weight(b.least[i], weight, frame_.options.penalty.border)};
+    }
+    if (told.least < reach) rank(view, told.least);
   }
 }
 
@@ -242,7 +246,7 @@ void TileRenderer::start_ranking(const RayBundle& bundle) {
 // The rays between the first and the last that could give the photo a penalty above `least` and yet prefer it.
 void TileRenderer::rank(std::uint32_t view, float least) {
   TileBuffers& b = buffers_;
-  b.ranked_for[view] = b.rankings;
+  b.told[view] = {b.rankings, infinite};
   std::size_t first = 0;
   std::size_t end = ranking_.rays;
   while (first < end && worst_.of_lanes[first / ray_lanes] <= least) first += ray_lanes;
@@ -272,19 +276,30 @@ void TileRenderer::choose(const Bundle& bundle) {
   start_ranking(b.rays.bundle(bundle.first, count, frame_.wanted));
   for (const std::uint32_t view : b.likely) rank(view, 0);
   rank_all(b.near, bundle.box, bound_);
-  if (worst_.largest > bound_) rank_all(frame_.speaking, box_of_open(bundle), infinite);
+  rank_beyond(bundle);
   keep_best();
   std::copy_n(b.rays.pixel.begin() + static_cast<std::ptrdiff_t>(bundle.first), count, b.pixel.begin());
   hand_on();
 }
 
-// Of those rays that photos beyond the tile's bound could speak for.
-RaysBox TileRenderer::box_of_open(const Bundle& bundle) {
+// In rounds: each leaves fewer rays open, of a smaller box, and photos that could not win any more after the likely
+// ones are not looked at.
+void TileRenderer::rank_beyond(const Bundle& bundle) {
+  float step = first_step;
+  for (float bound = bound_; worst_.largest > bound; step *= step) {
+    const RaysBox box = box_of_open(bundle, bound);
+    bound = bound > 0 ? step * bound : infinite;
+    rank_all(frame_.speaking, box, bound);
+  }
+}
+
+// Of those rays that photos beyond the bound could speak for.
+RaysBox TileRenderer::box_of_open(const Bundle& bundle, float bound) {
   const auto worst = worst_of(ranking_);
   TileRays& open = buffers_.some;
   open.resize(0);
   for (std::size_t i = 0; i < worst.size(); ++i) {
-    if (worst[i] <= bound_) continue;
+    if (worst[i] <= bound) continue;
     open.resize(open.size() + 1);
     open.copy(bundle.first + i, buffers_.rays, open.size() - 1);
   }
