@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "host/blending/vectorized.h"
@@ -99,44 +100,59 @@ inline __attribute__((always_inline)) void project_all(const AnsweringView& v, c
   }
 }
 
-// Multiplies the weights by what the photo sees of points at these inverse depths: between four texels.
+inline bool any_below(const float* a, const float* b, std::size_t count) {
+  int below = 0;
+  for (std::size_t i = 0; i < count; ++i) below |= a[i] < b[i] ? 1 : 0;
+  return below != 0;
+}
+
+// Multiplies the weights by what the photo sees of points at these inverse depths: between four texels. Where none of
+// ray_lanes neighbours has a plain penalty below its `worst`, dividing by weights helps none: theirs become 0.
 MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, const float* inverse_depth,
-                        float tolerance, std::size_t count) {
+                        float tolerance, const float* plain, const float* worst, std::size_t count) {
   const float* x = answers.x.data();
   const float* y = answers.y.data();
   float* weight = answers.weight.data();
-  const std::uint32_t* texels = sight.texels.data();
   const float per_px = sight.texels_per_px;
   const auto last_x = static_cast<float>(sight.width - 1);
   const auto last_y = static_cast<float>(sight.height - 1);
   const int width = sight.width;
-  const float scale = sight.scale / 65535;
-  const float per_tolerance = 1 / tolerance;
-#pragma GCC ivdep  // the spans don't overlap
+  alignas(64) std::array<float, largest_bundle> a;
+  alignas(64) std::array<float, largest_bundle> b;
+  alignas(64) std::array<std::int32_t, largest_bundle> at;
   for (std::size_t i = 0; i < count; ++i) {
     const float u = smaller(larger(x[i] * per_px - 0.5F, 0.0F), last_x);
     const float v = smaller(larger(y[i] * per_px - 0.5F, 0.0F), last_y);
     const int x0 = static_cast<int>(u);
     const int y0 = static_cast<int>(v);
-    const int right = static_cast<float>(x0) < last_x ? 1 : 0;
-    const int below = static_cast<float>(y0) < last_y ? width : 0;
-    const float a = u - static_cast<float>(x0);
-    const float b = v - static_cast<float>(y0);
-    const int at = y0 * width + x0;
-    const std::uint32_t t00 = texels[at];
-    const std::uint32_t t01 = texels[at + right];
-    const std::uint32_t t10 = texels[at + below];
-    const std::uint32_t t11 = texels[at + below + right];
-    const auto upper = [](std::uint32_t texel) { return static_cast<float>(static_cast<std::int32_t>(texel >> 16U)); };
-    const auto lower = [](std::uint32_t texel) {
-      return static_cast<float>(static_cast<std::int32_t>(texel & 0xFFFFU));
-    };
-    const float surface_top = upper(t00) + a * (upper(t01) - upper(t00));
-    const float surface_bottom = upper(t10) + a * (upper(t11) - upper(t10));
-    const float trust_top = lower(t00) + a * (lower(t01) - lower(t00));
-    const float trust_bottom = lower(t10) + a * (lower(t11) - lower(t10));
-    const float surface = scale * (surface_top + b * (surface_bottom - surface_top));
-    const float trust = (trust_top + b * (trust_bottom - trust_top)) / 65535;
+    a[i] = u - static_cast<float>(x0);
+    b[i] = v - static_cast<float>(y0);
+    at[i] = y0 * width + x0;
+  }
+  // Loads are a loop of their own, without arithmetic, so that the others are vectorized.
+  using Neighbours = std::array<SourceSight::Texel, 2>;
+  alignas(64) std::array<Neighbours, largest_bundle> top{};
+  alignas(64) std::array<Neighbours, largest_bundle> bottom{};
+  for (std::size_t first = 0; first < count; first += ray_lanes) {
+    if (!any_below(plain + first, worst + first, ray_lanes)) continue;
+    for (std::size_t i = first; i < first + ray_lanes; ++i) {
+      const SourceSight::Texel* texel = sight.texels.data() + at[i];
+      std::memcpy(&top[i], texel, sizeof(Neighbours));
+      std::memcpy(&bottom[i], texel + width, sizeof(Neighbours));
+    }
+  }
+  const float scale = sight.scale / 65535;
+  const float per_tolerance = 1 / tolerance;
+  const auto upper = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t >> 16U)); };
+  const auto lower = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t & 0xFFFFU)); };
+#pragma GCC ivdep  // the spans don't overlap
+  for (std::size_t i = 0; i < count; ++i) {
+    const float surface_top = upper(top[i][0]) + a[i] * (upper(top[i][1]) - upper(top[i][0]));
+    const float surface_bottom = upper(bottom[i][0]) + a[i] * (upper(bottom[i][1]) - upper(bottom[i][0]));
+    const float trust_top = lower(top[i][0]) + a[i] * (lower(top[i][1]) - lower(top[i][0]));
+    const float trust_bottom = lower(bottom[i][0]) + a[i] * (lower(bottom[i][1]) - lower(bottom[i][0]));
+    const float surface = scale * (surface_top + b[i] * (surface_bottom - surface_top));
+    const float trust = (trust_top + b[i] * (trust_bottom - trust_top)) / 65535;
     const float behind = surface / inverse_depth[i] - 1;  // of the point's depth: 0 on the surface
     const float sees = smooth(trust) * (1 - smooth(behind * per_tolerance - 1));
     weight[i] *= trust > 0 ? larger(least_sight, sees) : 0.0F;
@@ -151,12 +167,6 @@ MF_VECTORIZED void project_plain(const AnsweringView& v, const RayBundle& rays, 
 MF_VECTORIZED void project_distorted(const AnsweringView& v, const RayBundle& rays, const PenaltyOptions& o,
                                      const RayAnswers& out, float* inverse_depth, float* plain) {
   project_all<true>(v, rays, o, out, inverse_depth, plain);
-}
-
-MF_VECTORIZED bool any_below(const float* a, const float* b, std::size_t count) {
-  int below = 0;
-  for (std::size_t i = 0; i < count; ++i) below |= a[i] < b[i] ? 1 : 0;
-  return below != 0;
 }
 
 // plain / weight^γ for γ = ½, whose root is a machine instruction, and for any other.
@@ -175,8 +185,13 @@ void divide(std::span<const float> plain, std::span<const float> weight, float g
     penalty[i] = weight[i] > 0 ? plain[i] / std::pow(weight[i], gamma) : infinite;
 }
 
-MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t row_length, std::size_t rays, int rows,
-                          std::int32_t id, float* moving_penalty, std::int32_t* moving) {
+// Whether the candidate is among any ray's best. `offered`: its penalties.
+MF_VECTORIZED bool insert(float* penalty, std::int32_t* candidate, std::size_t row_length, std::size_t rays, int rows,
+                          std::int32_t id, const float* offered) {
+  if (!any_below(offered, penalty + static_cast<std::size_t>(rows - 1) * row_length, rays)) return false;
+  alignas(64) std::array<float, largest_bundle> moving_penalty;
+  alignas(64) std::array<std::int32_t, largest_bundle> moving;
+  for (std::size_t i = 0; i < rays; ++i) moving_penalty[i] = offered[i];
   for (std::size_t i = 0; i < rays; ++i) moving[i] = id;
   for (int row = 0; row < rows; ++row) {
     float* row_penalty = penalty + static_cast<std::size_t>(row) * row_length;
@@ -184,16 +199,17 @@ MF_VECTORIZED void insert(float* penalty, std::int32_t* candidate, std::size_t r
 #pragma GCC ivdep  // rows don't overlap
     for (std::size_t i = 0; i < rays; ++i) {
       const float held = row_penalty[i];
-      const float offered = moving_penalty[i];
+      const float moved = moving_penalty[i];
       const std::int32_t held_id = row_candidate[i];
-      const std::int32_t offered_id = moving[i];
-      const bool better = offered < held;
-      row_penalty[i] = better ? offered : held;
-      row_candidate[i] = better ? offered_id : held_id;
-      moving_penalty[i] = better ? held : offered;
-      moving[i] = better ? held_id : offered_id;
+      const std::int32_t moved_id = moving[i];
+      const bool better = moved < held;
+      row_penalty[i] = better ? moved : held;
+      row_candidate[i] = better ? moved_id : held_id;
+      moving_penalty[i] = better ? held : moved;
+      moving[i] = better ? held_id : moved_id;
     }
   }
+  return true;
 }
 
 // The largest singular value of the distortion's Jacobian, over a grid of the disc where it holds.
@@ -302,9 +318,8 @@ void answer(const AnsweringView& view, const RayBundle& rays, const PenaltyOptio
   else
     project_plain(view, rays, options, out, inverse_depth.data(), plain.data());
   const auto of_bundle = std::span<const float>(plain).first(count);
-  divide(of_bundle, out.weight, options.border, out.penalty);
-  if (view.sight == nullptr || !any_below(out.penalty.data(), worst.data(), count)) return;
-  look(*view.sight, out, inverse_depth.data(), depth_tolerance, count);
+  if (view.sight != nullptr)
+    look(*view.sight, out, inverse_depth.data(), depth_tolerance, plain.data(), worst.data(), count);
   divide(of_bundle, out.weight, options.border, out.penalty);
 }
 
@@ -315,13 +330,8 @@ void clear(const LeastPenalties& least) {
 
 bool add_candidate(const LeastPenalties& least, std::int32_t candidate, std::size_t first,
                    std::span<const float> penalty) {
-  if (!any_below(penalty.data(), worst_of(least).data() + first, penalty.size())) return false;
-  alignas(64) std::array<float, largest_bundle> moving_penalty;
-  alignas(64) std::array<std::int32_t, largest_bundle> moving;
-  std::copy(penalty.begin(), penalty.end(), moving_penalty.begin());
-  insert(least.penalty.data() + first, least.candidate.data() + first, least.rays, penalty.size(), least.k + 1,
-         candidate, moving_penalty.data(), moving.data());
-  return true;
+  return insert(least.penalty.data() + first, least.candidate.data() + first, least.rays, penalty.size(), least.k + 1,
+                candidate, penalty.data());
 }
 
 MF_VECTORIZED PenaltyRange range_of(std::span<const float> penalty) {

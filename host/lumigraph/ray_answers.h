@@ -90,8 +90,8 @@ struct RayAnswers {
 //   resolution  octaves, from the areas that a patch of the proxy covers in both pictures: f² |n·(X−C)| / z³. What the
 //               new view has beyond the finest photo (RayBundle) no photo can give, and none is blamed for
 //   weight      the soft border, times what the photo sees of X (SourceSight)
-// Only penalties below `worst` of their ray are finished; others are at least that, without what the photo sees of X.
-// Precondition: at most largest_bundle rays.
+// Penalties below `worst` of their ray are told; of rays where none is, the weight may count as 0.
+// Precondition: full lanes of rays, at most largest_bundle.
 void answer(const AnsweringView&, const RayBundle&, const PenaltyOptions&, float depth_tolerance,
             std::span<const float> worst, const RayAnswers&);
 

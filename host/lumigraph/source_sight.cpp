@@ -9,8 +9,10 @@
 #include <numbers>
 
 #include "common/check.h"
+#include "host/blending/vectorized.h"
 #include "host/lumigraph/area_average.h"
 #include "host/lumigraph/proxy_rays.h"
+#include "host/lumigraph/vector_math.h"
 
 namespace mf {
 
@@ -18,6 +20,7 @@ namespace {
 
 constexpr int step_px = 2;  // photo pixels a texel: silhouettes are given several pixels anyway
 constexpr float code_range = 65535;
+constexpr int columns = 8;            // of texels that bounds look at side by side
 constexpr float least_trust = 1e-4F;  // smoothed it is nothing, but only a mask takes all
 
 // Depth along the optical axis of each texel's centre; infinite: the proxy is not there.
@@ -135,6 +138,63 @@ void add_levels(SourceSight& sight) {
   }
 }
 
+struct CodeBounds {
+  float least_inverse_depth, largest_trust;
+};
+
+// Over a rectangle of at most `columns` texels' width, in codes. Each column is that from one texel to the next; of its
+// patch in each row counts what lies in the rectangle, whose corners have the extremes.
+MF_VECTORIZED CodeBounds bounds_between(const SourceSight::Texel* texels, int width, float left, float top, float right,
+                                        float bottom) {
+  alignas(32) std::array<float, columns> from;
+  alignas(32) std::array<float, columns> to;
+  alignas(32) std::array<float, columns> least;
+  alignas(32) std::array<float, columns> most;
+  const int x0 = static_cast<int>(left);
+  for (int i = 0; i < columns; ++i) {
+    const auto x = static_cast<float>(x0 + i);
+    from[i] = larger(left - x, 0.0F);
+    to[i] = smaller(larger(right - x, 0.0F), 1.0F);
+    least[i] = code_range;
+    most[i] = 0;
+  }
+  const auto upper = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t >> 16U)); };
+  const auto lower = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t & 0xFFFFU)); };
+  const auto between = [](float a, float b, float t) { return a + t * (b - a); };
+  for (int y = static_cast<int>(top); y <= static_cast<int>(bottom); ++y) {
+    const float first = larger(top - static_cast<float>(y), 0.0F);
+    const float last = smaller(bottom - static_cast<float>(y), 1.0F);
+    const SourceSight::Texel* above = texels + y * width + x0;
+    const SourceSight::Texel* below = above + width;
+    for (int i = 0; i < columns; ++i) {
+      const float depth_left = between(upper(above[i]), upper(above[i + 1]), from[i]);
+      const float depth_right = between(upper(above[i]), upper(above[i + 1]), to[i]);
+      const float depth_left_below = between(upper(below[i]), upper(below[i + 1]), from[i]);
+      const float depth_right_below = between(upper(below[i]), upper(below[i + 1]), to[i]);
+      const float trust_left = between(lower(above[i]), lower(above[i + 1]), from[i]);
+      const float trust_right = between(lower(above[i]), lower(above[i + 1]), to[i]);
+      const float trust_left_below = between(lower(below[i]), lower(below[i + 1]), from[i]);
+      const float trust_right_below = between(lower(below[i]), lower(below[i + 1]), to[i]);
+      least[i] = smaller(
+          least[i],
+          smaller(
+              smaller(between(depth_left, depth_left_below, first), between(depth_left, depth_left_below, last)),
+              smaller(between(depth_right, depth_right_below, first), between(depth_right, depth_right_below, last))));
+      most[i] = larger(
+          most[i],
+          larger(
+              larger(between(trust_left, trust_left_below, first), between(trust_left, trust_left_below, last)),
+              larger(between(trust_right, trust_right_below, first), between(trust_right, trust_right_below, last))));
+    }
+  }
+  CodeBounds all{least[0], most[0]};
+  for (int i = 1; i <= static_cast<int>(right) - x0; ++i) {
+    all.least_inverse_depth = smaller(all.least_inverse_depth, least[i]);
+    all.largest_trust = larger(all.largest_trust, most[i]);
+  }
+  return all;
+}
+
 }  // namespace
 
 std::optional<std::string> VisibilityOptions::validate() const {
@@ -155,11 +215,25 @@ SourceSight make_sight(const CameraModel& camera, const Rigid3& cam_from_world, 
   if (hides_itself(proxy)) set_depth(sight, camera, cam_from_world, proxy, options);
   if (!mask.empty()) trust_mask(sight, mask);
   add_levels(sight);
+  sight.texels.resize(sight.texels.size() + static_cast<std::size_t>(sight.width + columns));
   return sight;
 }
 
+SourceSight::Bounds SourceSight::bounds(float left, float top, float right, float bottom) const {
+  const int x0 = static_cast<int>(left);
+  const int y0 = static_cast<int>(top);
+  const int x1 = static_cast<int>(right);
+  const int y1 = static_cast<int>(bottom);
+  if (x1 - x0 >= columns || y1 - y0 >= columns)
+    return of_cells(x0, y0, std::min(x1 + 1, width - 1), std::min(y1 + 1, height - 1));
+  constexpr float rounding = 0.05F;  // of single precision in codes, several times
+  const CodeBounds codes = bounds_between(texels.data(), width, left, top, right, bottom);
+  return {scale / code_range * (codes.least_inverse_depth - rounding),
+          codes.largest_trust > 0 ? (codes.largest_trust + rounding) / code_range : 0.0F};
+}
+
 // The level is the finest at which the rectangle lies in three by three cells.
-SourceSight::Bounds SourceSight::bounds(int x0, int y0, int x1, int y1) const {
+SourceSight::Bounds SourceSight::of_cells(int x0, int y0, int x1, int y1) const {
   const auto longest = static_cast<unsigned>(std::max({x1 - x0, y1 - y0, 3}));
   const auto log2_side = static_cast<unsigned>(std::bit_width((longest - 1) / 2));  // ≥ 1
   const Level& level = levels[log2_side - 1];

@@ -35,10 +35,9 @@ struct SourceSight {
   int height = 0;
   float texels_per_px = 1;
   float scale = 0;            // inverse depth of code 65535, 1/m
-  std::vector<Texel> texels;  // width · height
+  std::vector<Texel> texels;  // width · height, and some behind them, so that each has neighbours to load
 
-  // What bounds are told from, small enough to stay near the processor for a thousand photos: cells of 2, 4, 8 ...
-  // texels a side, row by row, the finest level first.
+  // What bounds over many texels are told from: cells of 2, 4, 8 ... texels a side, row by row, the finest level first.
   struct Cell {
     std::uint8_t least_inverse_depth = 0;  // 255 at `scale`, rounded down
     std::uint8_t largest_trust = 0;        // 255 at 1, rounded up
@@ -50,14 +49,18 @@ struct SourceSight {
   std::vector<Cell> cells;
   std::array<Level, 16> levels;  // up to pictures of 2^17 pixels
 
-  // No place between the texels of the rectangle, corners included, shows less inverse depth or more trust.
+  // No place in the rectangle shows less inverse depth or more trust. Its sides are texels, from 0 to the last, and
+  // what lies between them. Over a few texels the bounds are what the bilinear patches have at their corners, exact.
   struct Bounds {
     float least_inverse_depth = 0;  // 1/m
     float largest_trust = 0;        // 0…1
   };
-  [[nodiscard]] Bounds bounds(int x0, int y0, int x1, int y1) const;
+  [[nodiscard]] Bounds bounds(float left, float top, float right, float bottom) const;
 
   [[nodiscard]] bool empty() const { return texels.empty(); }
+
+ private:
+  [[nodiscard]] Bounds of_cells(int x0, int y0, int x1, int y1) const;
 };
 
 // Empty where the photo shows everything that lies in its picture: no mask, and a proxy that hides nothing of itself

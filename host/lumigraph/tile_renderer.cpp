@@ -18,6 +18,7 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr int bundle_side = 8;        // pixels
 constexpr std::size_t samples = 16;   // rays that stand for a tile when its bound is guessed
 constexpr float bound_slack = 1.03F;  // on the guess: fewer rays are ranked twice
+constexpr float first_step = 1.5F;    // from the tile's bound to the next; the further ones are its powers
 constexpr float same_ray = 1e-6F;     // radians: what single precision leaves of an angle of 0
 static_assert(bundle_side * bundle_side <= largest_bundle);
 
@@ -84,6 +85,7 @@ TileRenderer::TileRenderer(const TileFrame& frame, TileBuffers& buffers, const T
   buffers.least_candidate.resize(entries);
   buffers.chosen_weight.resize(entries);
   buffers.pixel.resize(largest_bundle);
+  buffers.told.resize(frame.views.size());
 }
 
 void TileRenderer::render(int x0, int y0) {
@@ -201,12 +203,9 @@ void TileRenderer::choose_for_tile() {
   }
 }
 
-// Ranks those photos of the table that some ray could give a penalty below `bound` and prefer: first the best of the
-// rays before, whose penalties then show of most others by their bounds alone that they are not among the best here.
-void TileRenderer::rank_all(const RayBundle& bundle, const RaysBox& box, const ViewTable& table, float bound) {
+// Ranks those photos of the table that some ray of the box could give a penalty below `bound` and prefer.
+void TileRenderer::rank_all(const ViewTable& table, const RaysBox& box, float bound) {
   TileBuffers& b = buffers_;
-  start_ranking(bundle);
-  for (const std::uint32_t view : b.likely) rank(view, 0);
   b.least.resize(table.size());
   least_penalties(table, box, frame_.options.penalty, b.least);
   const RaysCorners corners = corners_of(box, axes_);
@@ -214,15 +213,13 @@ void TileRenderer::rank_all(const RayBundle& bundle, const RaysBox& box, const V
     const float reach = std::min(worst_.largest, bound);
     if (!(b.least[i] < reach)) continue;
     const std::uint32_t view = table.numbers()[i];
-    const float weight = largest_weight(frame_.views[view], corners, frame_.depth_tolerance);
-    const float least = of_weight(b.least[i], weight, frame_.options.penalty.border);
-    if (least < reach && !is_likely(view)) rank(view, least);
+    ToldOfPhoto& told = b.told[view];
+    if (told.ranking != b.rankings) {
+      const float weight = largest_weight(frame_.views[view], corners, frame_.depth_tolerance);
+      told = {b.rankings, of_weight(b.least[i], weight, frame_.options.penalty.border)};
+    }
+    if (told.least < reach) rank(view, told.least);
   }
-  keep_best();
-}
-
-bool TileRenderer::is_likely(std::uint32_t view) const {
-  return std::find(buffers_.likely.begin(), buffers_.likely.end(), view) != buffers_.likely.end();
 }
 
 // The photos that are among some ray's k + 1 best.
@@ -243,11 +240,13 @@ void TileRenderer::start_ranking(const RayBundle& bundle) {
   clear(ranking_);
   worst_ = range_of(worst_of(ranking_));
   b.view.clear();
+  ++b.rankings;
 }
 
 // The rays between the first and the last that could give the photo a penalty above `least` and yet prefer it.
 void TileRenderer::rank(std::uint32_t view, float least) {
   TileBuffers& b = buffers_;
+  b.told[view] = {b.rankings, infinite};
   std::size_t first = 0;
   std::size_t end = ranking_.rays;
   while (first < end && worst_.of_lanes[first / ray_lanes] <= least) first += ray_lanes;
@@ -269,32 +268,43 @@ void TileRenderer::rank(std::uint32_t view, float least) {
   worst_ = range_of(worst_of(ranking_));
 }
 
+// First the best of the rays before, whose penalties then show of most others by their bounds alone that they are not
+// among the best here.
 void TileRenderer::choose(const Bundle& bundle) {
   TileBuffers& b = buffers_;
   const std::size_t count = bundle.end - bundle.first;
-  rank_all(b.rays.bundle(bundle.first, count, frame_.wanted), bundle.box, b.near, bound_);
-  const auto worst = worst_of(ranking_);
-  TileRays& again = b.some;
-  again.resize(0);
-  for (std::size_t i = 0; i < count; ++i) {
-    b.pixel[i] = b.rays.pixel[bundle.first + i];
-    if (worst[i] <= bound_ || b.pixel[i] < 0) continue;
-    again.resize(again.size() + 1);
-    again.copy(bundle.first + i, b.rays, again.size() - 1);
-    b.pixel[i] = -1;
-  }
+  start_ranking(b.rays.bundle(bundle.first, count, frame_.wanted));
+  for (const std::uint32_t view : b.likely) rank(view, 0);
+  rank_all(b.near, bundle.box, bound_);
+  rank_beyond(bundle);
+  keep_best();
+  std::copy_n(b.rays.pixel.begin() + static_cast<std::ptrdiff_t>(bundle.first), count, b.pixel.begin());
   hand_on();
-  if (again.size() > 0) choose_again();
 }
 
-// The best of the tile's photos are ranked before all others: their bounds need only beat those.
-void TileRenderer::choose_again() {
-  TileBuffers& b = buffers_;
-  b.some.fill_lanes(0);
-  std::copy(b.some.pixel.begin(), b.some.pixel.end(), b.pixel.begin());
-  const RayBundle rays = b.some.bundle(0, b.some.size(), frame_.wanted);
-  rank_all(rays, box_of(rays, axes_), frame_.speaking, infinite);
-  hand_on();
+// In rounds: each leaves fewer rays open, of a smaller box, and photos that could not win any more after the likely
+// ones are not looked at.
+void TileRenderer::rank_beyond(const Bundle& bundle) {
+  float step = first_step;
+  for (float bound = bound_; worst_.largest > bound; step *= step) {
+    const RaysBox box = box_of_open(bundle, bound);
+    bound = bound > 0 ? step * bound : infinite;
+    rank_all(frame_.speaking, box, bound);
+  }
+}
+
+// Of those rays that photos beyond the bound could speak for.
+RaysBox TileRenderer::box_of_open(const Bundle& bundle, float bound) {
+  const auto worst = worst_of(ranking_);
+  TileRays& open = buffers_.some;
+  open.resize(0);
+  for (std::size_t i = 0; i < worst.size(); ++i) {
+    if (worst[i] <= bound) continue;
+    open.resize(open.size() + 1);
+    open.copy(bundle.first + i, buffers_.rays, open.size() - 1);
+  }
+  open.fill_lanes(0);
+  return box_of(open.bundle(0, open.size(), frame_.wanted), axes_);
 }
 
 void TileRenderer::hand_on() {

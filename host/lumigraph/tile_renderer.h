@@ -53,6 +53,12 @@ struct TileFrame {
   WantedResolution wanted{};
 };
 
+// What a ranking knows of a photo.
+struct ToldOfPhoto {
+  std::uint64_t ranking = 0;  // which one
+  float least = 0;            // no ray gives the photo a smaller penalty; infinite: it is ranked
+};
+
 // The memory that a thread renders tiles with. It is worth keeping from frame to frame.
 struct TileBuffers {
   TileRays rays;                                  // of the tile, bundle by bundle
@@ -62,6 +68,8 @@ struct TileBuffers {
   std::vector<float> of_part;                     // the same, for a part of the tile
   std::vector<std::uint32_t> heap;                // rows of the table, the least first
   std::vector<std::uint32_t> likely;              // photos that were among the best of the rays before
+  std::uint64_t rankings = 0;                     // so many were started
+  std::vector<ToldOfPhoto> told;                  // of each photo, by the last of them that looked at it
   std::vector<std::uint32_t> view;                // the photos that were ranked
   std::vector<std::uint8_t> is_best;              // each of those: among the best of a ray
   std::vector<float> x, y, lod, weight, penalty;  // their answers, a row each
@@ -84,8 +92,8 @@ class TilePool {
 //
 // For the tile, and then for each bundle of 8 × 8 rays, it is told of all photos at once what penalty no ray undercuts
 // (view_bounds.h); ranked are those that could yet be among the k + 1 best of a ray. Bundles look only at photos up to
-// a bound, which some rays of the tile guess; a ray whose (k + 1)-th best is above the bound is ranked again, among all
-// photos. So every ray gets what ranking all photos would have given it.
+// a bound, which some rays of the tile guess; where a ray's (k + 1)-th best is above the bound, the others follow,
+// the likely ones first. So every ray gets what ranking all photos would have given it.
 class TileRenderer {
  public:
   TileRenderer(const TileFrame&, TileBuffers&, const TakeChosen&);
@@ -106,16 +114,16 @@ class TileRenderer {
   void bound_for_tile();
   void choose_for_tile();
   void choose(const Bundle&);
-  void choose_again();
   void hand_on();
 
   // A ranking of photos for some rays: in `buffers_` and what follows here.
   void start_ranking(const RayBundle&);
   // `least`: no ray gives the photo a smaller penalty.
   void rank(std::uint32_t view, float least);
-  void rank_all(const RayBundle&, const RaysBox&, const ViewTable&, float bound);
+  void rank_all(const ViewTable&, const RaysBox&, float bound);
+  void rank_beyond(const Bundle&);
+  [[nodiscard]] RaysBox box_of_open(const Bundle&, float bound);
   void keep_best();
-  [[nodiscard]] bool is_likely(std::uint32_t view) const;
   RayBundle bundle_;
   LeastPenalties ranking_;
   PenaltyRange worst_;  // of each ray's (k + 1)-th best

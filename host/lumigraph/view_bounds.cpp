@@ -195,14 +195,11 @@ Rectangle in_pixels(const AnsweringCamera& c, Rectangle r) {
 }
 
 float sight_at_most(const SourceSight& sight, const Rectangle& px, float tolerance) {
-  const auto texel = [&](float at, int last) {
-    return static_cast<int>(smaller(larger(at * sight.texels_per_px - 0.5F, 0.0F), static_cast<float>(last)));
+  const auto texel = [&](float at, int texels) {
+    return smaller(larger(at * sight.texels_per_px - 0.5F, 0.0F), static_cast<float>(texels - 1));
   };
-  const int last_x = sight.width - 1;
-  const int last_y = sight.height - 1;
-  const SourceSight::Bounds bounds =
-      sight.bounds(texel(px.left, last_x), texel(px.top, last_y), std::min(texel(px.right, last_x) + 1, last_x),
-                   std::min(texel(px.bottom, last_y) + 1, last_y));
+  const SourceSight::Bounds bounds = sight.bounds(texel(px.left, sight.width), texel(px.top, sight.height),
+                                                  texel(px.right, sight.width), texel(px.bottom, sight.height));
   if (!(bounds.largest_trust > 0)) return 0;
   const float behind = bounds.least_inverse_depth * px.nearest_z - 1;
   return larger(least_sight, smooth(bounds.largest_trust) * (1 - smooth(behind / tolerance - 1)));

@@ -151,23 +151,39 @@ TEST(Lumigraph, EveryPixelHasTheWeightsOfRankingAllPhotos) {
   }
 }
 
-TEST(Lumigraph, APictureHasTheWeightsOfItsPixels) {
-  // With a mesh, where depth jumps inside of blocks and photos hide points from each other: the picture against one
-  // pixel at a time, which no tile or block can mislead.
-  const Proxy walls = ball();
-  const std::vector<View> views = test::cap_of_views(80, 4, 60, pinhole(64, 40));
-  const PhotoSet set = photos_of(views, walls, blotches(0.4F));
-  const Lumigraph lumigraph(set, ball());
-  const View wanted{pinhole(96, 50), looking({1.5, -2, 2.5}, {0, 0, -0.3})};
+// The picture against one pixel at a time, which no tile or block can mislead.
+void expect_weights_of_pixels(const Lumigraph& lumigraph, const View& wanted) {
   const LumigraphPicture picture = lumigraph.render(wanted, {});
-  for (int y = 1; y < 96; y += 3)
-    for (int x = 0; x < 96; x += 3) {
+  for (int y = 1; y < wanted.camera.height; y += 3)
+    for (int x = 0; x < wanted.camera.width; x += 3) {
       const LumigraphPicture alone = lumigraph.render(pixel_of_view(wanted, {x + 0.5, y + 0.5}), {});
       ASSERT_EQ(alone.covered.data[0], picture.covered.at(x, y)) << x << ", " << y;
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(std::get<ImageF>(alone.picture).at(0, 0, c), std::get<ImageF>(picture.picture).at(x, y, c), 2e-4)
             << x << ", " << y;
     }
+}
+
+// With a mesh, where depth jumps inside of blocks and photos hide points from each other.
+TEST(Lumigraph, APictureHasTheWeightsOfItsPixels) {
+  const Proxy walls = ball();
+  const std::vector<View> views = test::cap_of_views(80, 4, 60, pinhole(64, 40));
+  const Lumigraph lumigraph(photos_of(views, walls, blotches(0.4F)), ball());
+  expect_weights_of_pixels(lumigraph, {pinhole(96, 50), looking({1.5, -2, 2.5}, {0, 0, -0.3})});
+}
+
+// From their place nearly all of a tile needs no other photo, and its bound is next to 0.
+TEST(Lumigraph, OtherPhotosSpeakWhereThoseOfThePlaceAreMasked) {
+  const Proxy walls = ball();
+  std::vector<View> views = test::cap_of_views(40, 4, 60, pinhole(96, 40));
+  const View wanted = views[20];
+  views.insert(views.end(), 6, wanted);
+  PhotoSet set = photos_of(views, walls, blotches(0.4F));
+  ImageU8 mask(96, 96, 1, 255);
+  for (int y = 34; y < 46; ++y)
+    for (int x = 50; x < 80; ++x) mask.at(x, y) = 0;
+  for (const std::size_t i : {20U, 40U, 41U, 42U, 43U, 44U, 45U}) set.photos[i].mask = mask;
+  expect_weights_of_pixels(Lumigraph(set, ball()), wanted);
 }
 
 TEST(Lumigraph, NewViewsOfAKnownShapeAreTheTruth) {
