@@ -116,8 +116,8 @@ EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surrou
 }
 
 EmitterBlender::EmitterBlender(const std::vector<FieldView>& views, const Surroundings& surroundings,
-                               std::vector<ShadedEmitter> emitters, Lit lit, Asked asked)
-    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)), lit_(lit), asked_(asked) {}
+                               std::vector<ShadedEmitter> emitters, Lit lit)
+    : views_(views), surroundings_(surroundings), emitters_(std::move(emitters)), lit_(lit) {}
 
 std::uint32_t EmitterBlender::concerned(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
                                         float angle_rad) const {
@@ -157,11 +157,7 @@ Eigen::Vector4f EmitterBlender::radiance(const ShadedEmitter* met, const Eigen::
   }
   const Question question{met, p, proxy_point(p, direction, surroundings_.inverse_distance_along(p, direction)),
                           angle_rad};
-  if (asked_ == Asked::nearest)
-    ask_nearest(*this, question, views_, candidates, answers);
-  else
-    for (const std::uint32_t v : candidates)
-      ask(*this, question, views_[v], ray_distance(p, question.x, views_[v].centre_in_world), answers);
+  ask_nearest(*this, question, views_, candidates, answers);
   std::array<ViewWeight, most_views> weights;
   thread_local std::vector<ViewPenalty> ranked;
   ranked.clear();

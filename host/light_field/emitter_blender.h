@@ -34,13 +34,9 @@ class EmitterBlender {
   // references to views and surroundings.
   EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::span<const Emitter>,
                  const PlaneRectangle&, const Team&);
-  // With masks that are drawn already. `Lit::no`: rays that meet an emitter are black, hidden or not. `Asked::nearest`:
-  // candidates that pass a ray too far off to speak for it are left out; it is faster, and the answer the same but for
-  // the order of a sum.
+  // With masks that are drawn already. `Lit::no`: rays that meet an emitter are black, hidden or not.
   enum class Lit { no, yes };
-  enum class Asked { nearest, all };
-  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>, Lit,
-                 Asked = Asked::all);
+  EmitterBlender(const std::vector<FieldView>& views, const Surroundings&, std::vector<ShadedEmitter>, Lit);
 
   // 1 + the index of an emitter that rays within `angle_rad` of the direction may see, or a ghost of it; 0: none.
   [[nodiscard]] std::uint32_t concerned(const Eigen::Vector3f& p, const Eigen::Vector3f& direction,
@@ -66,7 +62,6 @@ class EmitterBlender {
   const Surroundings& surroundings_;
   std::vector<ShadedEmitter> emitters_;
   Lit lit_ = Lit::yes;
-  Asked asked_ = Asked::all;
 };
 
 }  // namespace mf

@@ -156,8 +156,7 @@ std::vector<PlaneTile> resample_just_in_time(const std::vector<FieldView>& views
   if (focused.surroundings.is_plane()) return over_the_plane(views, focused, penalty.k, requests, options.most_texels);
   const ProxyVisibility visibility(views, focused.surroundings, focused.plane);
   // Emitters are black here, and views that show their glare have no say.
-  const EmitterBlender emitters(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no,
-                                options.rough ? EmitterBlender::Asked::nearest : EmitterBlender::Asked::all);
+  const EmitterBlender emitters(views, focused.surroundings, focused.emitters, EmitterBlender::Lit::no);
   const HoleFiller filler(focused);
   tbb::enumerable_thread_specific<Worker> workers(
       [&] { return Worker(views, focused, visibility, emitters, filler, penalty, options); });

@@ -16,8 +16,7 @@ struct JustInTimeOptions {
   // out: so a preview needs few. A multiple of 8, at least 8.
   int most_texels = 8;
   // Takes less care of what a mean over many cells hides: a cell is fetched from a view in 6 parts instead of the 12 of
-  // a light field's tile, of what no view saw every fourth texel is guessed, and beside emitters only the views nearest
-  // to a ray are asked. It costs two thirds of the time.
+  // a light field's tile, and of what no view saw every fourth texel is guessed. It costs two thirds of the time.
   bool rough = false;
 };
 

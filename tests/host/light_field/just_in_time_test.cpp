@@ -9,6 +9,7 @@
 
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/emitter_light.h"
+#include "host/light_field/ray_answer.h"
 #include "host/light_field/resample.h"
 #include "tests/host/light_field/synthetic_views.h"
 
@@ -138,25 +139,24 @@ TEST_F(JustInTime, APreviewOfAPartOfThePlaneBringsTheSameLight) {
   }
 }
 
-// Views that pass a ray too far off to speak for it need not be asked.
+// Views that pass a ray beside the lamp too far off to speak for it are not asked; the answer is that of all.
 TEST_F(JustInTime, TheNearestViewsAnswerForAll) {
-  using Asked = EmitterBlender::Asked;
   const Surroundings& s = focused_->surroundings;
-  const EmitterBlender all(*views_, s, focused_->emitters, EmitterBlender::Lit::no);
-  const EmitterBlender nearest(*views_, s, focused_->emitters, EmitterBlender::Lit::no, Asked::nearest);
+  const EmitterBlender blender(*views_, s, focused_->emitters, EmitterBlender::Lit::no);
   std::vector<std::uint32_t> candidates(views_->size());
   std::iota(candidates.begin(), candidates.end(), 0U);
   int answered = 0;
-  for (int i = 0; i < 400; ++i) {  // beside the lamp, and across it
+  for (int i = 0; i < 400; ++i) {
     const Eigen::Vector3f p(-0.18F + 0.018F * static_cast<float>(i % 20), 0.05F, 0);
     const Eigen::Vector3f at = focused_->emitters.front().emitter.position +
                                Eigen::Vector3f(-0.2F + 0.02F * static_cast<float>(i / 20), 0.01F, 0);
     const Eigen::Vector3f d = (at - p).normalized();
-    const ShadedEmitter* met = emitter_met(focused_->emitters, p, d);
-    const Eigen::Vector4f expected = all.radiance(met, p, d, 0.02F, candidates);
-    const Eigen::Vector4f answer = nearest.radiance(met, p, d, 0.02F, candidates);
-    EXPECT_LE((answer - expected).norm(), 1e-5F * expected.norm()) << i;
-    answered += expected.head<3>().norm() > 0 ? 1 : 0;
+    if (emitter_met(focused_->emitters, p, d) != nullptr) continue;
+    const RayAnswer of_all = answer_of(*views_, s, {p, d, 0.02F}, {{4, 1, 0, 1}, nullptr, &blender, {}});
+    const Eigen::Vector4f answer = blender.radiance(nullptr, p, d, 0.02F, candidates);
+    EXPECT_LE((answer.head<3>() - of_all.radiance).norm(), 1e-4F * of_all.radiance.norm()) << i;
+    EXPECT_NEAR(answer.w(), of_all.confidence, 1e-4F) << i;
+    answered += of_all.speaking.empty() ? 0 : 1;
   }
   EXPECT_GT(answered, 200);
 }
