@@ -69,23 +69,29 @@ ProxyVisibility::ProxyVisibility(const std::vector<FieldView>& views, const Surr
     : views_(views), plane_height_m_(static_cast<float>(rectangle.world_from_plane.translation.z())) {
   if (!has_fronts(surroundings)) return;
   met_.resize(views.size());
-  tbb::parallel_for(std::size_t{0}, views.size(),
-                    [&](std::size_t i) { met_[i] = met_by(views[i], surroundings, rectangle); });
+  nearest_met_.resize(views.size());
+  tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t i) {
+    met_[i] = met_by(views[i], surroundings, rectangle);
+    nearest_met_[i] = *std::max_element(met_[i].data.begin(), met_[i].data.end());
+  });
 }
 
 float ProxyVisibility::of_view(std::size_t view, const ProxyPoint& x) const {
   if (met_.empty()) return 1;
-  const Eigen::Vector3f pixel = pixel_of(views_[view], x);
   const Eigen::Vector3f& centre = views_[view].centre_in_world;
   const Eigen::Vector3f ray = ray_to(x, centre);  // to X, times X's w
-  if (pixel.z() <= 0 || ray.z() <= 0) return 1;
+  if (ray.z() <= 0) return 1;
   const float crossed = x.w() * (plane_height_m_ - centre.z()) / ray.z();  // the plane, at this share of the way to X
   if (crossed >= 1) return 1;
   const float expected = x.w() / (ray.norm() * (1 - crossed));
+  constexpr float least_step = 0.1F, share = 0.1F;  // see the header
+  const float step = least_step + share * expected;
+  if (nearest_met_[view] <= expected + step) return 1;
+  const Eigen::Vector3f pixel = pixel_of(views_[view], x);
+  if (pixel.z() <= 0) return 1;
   const float texels = 1 / (pixel.z() * pixels_apart(views_[view]));
   const float met = value_at(met_[view], pixel.x() * texels, pixel.y() * texels);
-  constexpr float least_step = 0.1F, share = 0.1F;  // see the header
-  return std::clamp(2 - (met - expected) / (least_step + share * expected), 0.0F, 1.0F);
+  return std::clamp(2 - (met - expected) / step, 0.0F, 1.0F);
 }
 
 }  // namespace mf

@@ -30,8 +30,9 @@ class ProxyVisibility {
 
  private:
   const std::vector<FieldView>& views_;
-  float plane_height_m_;     // world z
-  std::vector<ImageF> met_;  // by view: inverse distance from the plane, 1/m; empty when nothing is hidden
+  float plane_height_m_;            // world z
+  std::vector<ImageF> met_;         // by view: inverse distance from the plane, 1/m; empty when nothing is hidden
+  std::vector<float> nearest_met_;  // by view: the largest of these
 };
 
 }  // namespace mf
