@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "host/light_field/map_lookup.h"
+
 namespace mf {
 
 namespace {
@@ -46,18 +48,6 @@ ImageF met_by(const FieldView& view, const Surroundings& surroundings, const Pla
   return met;
 }
 
-// Bilinear, in texels; the map's border goes on beyond it.
-float value_at(const ImageF& met, float u, float v) {
-  const float x = std::clamp(u - 0.5F, 0.0F, static_cast<float>(met.width - 1));
-  const float y = std::clamp(v - 0.5F, 0.0F, static_cast<float>(met.height - 1));
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, met.width - 1), y1 = std::min(y0 + 1, met.height - 1);
-  const float right = x - static_cast<float>(x0), down = y - static_cast<float>(y0);
-  const float above = met.at(x0, y0) + right * (met.at(x1, y0) - met.at(x0, y0));
-  const float below = met.at(x0, y1) + right * (met.at(x1, y1) - met.at(x0, y1));
-  return above + down * (below - above);
-}
-
 bool has_fronts(const Surroundings& s) {
   return !s.is_plane() && !s.box && (s.mesh != nullptr || s.inverse_distance.data.size() > 1);
 }
@@ -90,7 +80,7 @@ float ProxyVisibility::of_view(std::size_t view, const ProxyPoint& x) const {
   const Eigen::Vector3f pixel = pixel_of(views_[view], x);
   if (pixel.z() <= 0) return 1;
   const float texels = 1 / (pixel.z() * pixels_apart(views_[view]));
-  const float met = value_at(met_[view], pixel.x() * texels, pixel.y() * texels);
+  const float met = bilinear(met_[view], pixel.x() * texels, pixel.y() * texels);
   return std::clamp(2 - (met - expected) / step, 0.0F, 1.0F);
 }
 

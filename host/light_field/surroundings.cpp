@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "host/light_field/distance_march.h"
+#include "host/light_field/map_lookup.h"
 #include "host/tracing/ray_scene.h"
 
 namespace mf {
@@ -33,18 +34,6 @@ float inverse_to_mesh(const RayScene& mesh, const Eigen::Vector3f& p, const Eige
   return hit ? 1 / (hit->distance + nearest_m) : 0;
 }
 
-float bilinear(const ImageF& map, const Eigen::Vector2f& position) {
-  const float x =
-      std::clamp(position.x() * static_cast<float>(map.width) - 0.5F, 0.0F, static_cast<float>(map.width - 1));
-  const float y =
-      std::clamp(position.y() * static_cast<float>(map.height) - 0.5F, 0.0F, static_cast<float>(map.height - 1));
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const int x1 = std::min(x0 + 1, map.width - 1), y1 = std::min(y0 + 1, map.height - 1);
-  const float fx = x - static_cast<float>(x0), fy = y - static_cast<float>(y0);
-  return (map.at(x0, y0) * (1 - fx) + map.at(x1, y0) * fx) * (1 - fy) +
-         (map.at(x0, y1) * (1 - fx) + map.at(x1, y1) * fx) * fy;
-}
-
 }  // namespace
 
 Eigen::Vector2f equal_area_square(const Eigen::Vector3f& d) {
@@ -66,7 +55,9 @@ float Surroundings::inverse_distance_of(const Eigen::Vector3f& direction) const 
   if (box) return box->inverse_distance_along(centre_in_world, direction);
   if (mesh) return inverse_to_mesh(*mesh, centre_in_world, direction);
   if (inverse_distance.data.size() == 1) return inverse_distance.data[0];
-  return bilinear(inverse_distance, equal_area_square(direction));
+  const Eigen::Vector2f at = equal_area_square(direction);
+  return bilinear(inverse_distance, at.x() * static_cast<float>(inverse_distance.width),
+                  at.y() * static_cast<float>(inverse_distance.height));
 }
 
 float Surroundings::inverse_distance_along(const Eigen::Vector3f& p, const Eigen::Vector3f& direction) const {

@@ -143,14 +143,13 @@ MF_VECTORIZED void look(const SourceSight& sight, const RayAnswers& answers, con
   }
   const float scale = sight.scale / 65535;
   const float per_tolerance = 1 / tolerance;
-  const auto upper = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t >> 16U)); };
-  const auto lower = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t & 0xFFFFU)); };
 #pragma GCC ivdep  // the spans don't overlap
   for (std::size_t i = 0; i < count; ++i) {
-    const float surface_top = upper(top[i][0]) + a[i] * (upper(top[i][1]) - upper(top[i][0]));
-    const float surface_bottom = upper(bottom[i][0]) + a[i] * (upper(bottom[i][1]) - upper(bottom[i][0]));
-    const float trust_top = lower(top[i][0]) + a[i] * (lower(top[i][1]) - lower(top[i][0]));
-    const float trust_bottom = lower(bottom[i][0]) + a[i] * (lower(bottom[i][1]) - lower(bottom[i][0]));
+    const float surface_top = depth_code(top[i][0]) + a[i] * (depth_code(top[i][1]) - depth_code(top[i][0]));
+    const float surface_bottom =
+        depth_code(bottom[i][0]) + a[i] * (depth_code(bottom[i][1]) - depth_code(bottom[i][0]));
+    const float trust_top = trust_code(top[i][0]) + a[i] * (trust_code(top[i][1]) - trust_code(top[i][0]));
+    const float trust_bottom = trust_code(bottom[i][0]) + a[i] * (trust_code(bottom[i][1]) - trust_code(bottom[i][0]));
     const float surface = scale * (surface_top + b[i] * (surface_bottom - surface_top));
     const float trust = (trust_top + b[i] * (trust_bottom - trust_top)) / 65535;
     const float behind = surface / inverse_depth[i] - 1;  // of the point's depth: 0 on the surface

@@ -158,8 +158,6 @@ MF_VECTORIZED CodeBounds bounds_between(const SourceSight::Texel* texels, int wi
     least[i] = code_range;
     most[i] = 0;
   }
-  const auto upper = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t >> 16U)); };
-  const auto lower = [](SourceSight::Texel t) { return static_cast<float>(static_cast<std::int32_t>(t & 0xFFFFU)); };
   const auto between = [](float a, float b, float t) { return a + t * (b - a); };
   for (int y = static_cast<int>(top); y <= static_cast<int>(bottom); ++y) {
     const float first = larger(top - static_cast<float>(y), 0.0F);
@@ -167,14 +165,14 @@ MF_VECTORIZED CodeBounds bounds_between(const SourceSight::Texel* texels, int wi
     const SourceSight::Texel* above = texels + y * width + x0;
     const SourceSight::Texel* below = above + width;
     for (int i = 0; i < columns; ++i) {
-      const float depth_left = between(upper(above[i]), upper(above[i + 1]), from[i]);
-      const float depth_right = between(upper(above[i]), upper(above[i + 1]), to[i]);
-      const float depth_left_below = between(upper(below[i]), upper(below[i + 1]), from[i]);
-      const float depth_right_below = between(upper(below[i]), upper(below[i + 1]), to[i]);
-      const float trust_left = between(lower(above[i]), lower(above[i + 1]), from[i]);
-      const float trust_right = between(lower(above[i]), lower(above[i + 1]), to[i]);
-      const float trust_left_below = between(lower(below[i]), lower(below[i + 1]), from[i]);
-      const float trust_right_below = between(lower(below[i]), lower(below[i + 1]), to[i]);
+      const float depth_left = between(depth_code(above[i]), depth_code(above[i + 1]), from[i]);
+      const float depth_right = between(depth_code(above[i]), depth_code(above[i + 1]), to[i]);
+      const float depth_left_below = between(depth_code(below[i]), depth_code(below[i + 1]), from[i]);
+      const float depth_right_below = between(depth_code(below[i]), depth_code(below[i + 1]), to[i]);
+      const float trust_left = between(trust_code(above[i]), trust_code(above[i + 1]), from[i]);
+      const float trust_right = between(trust_code(above[i]), trust_code(above[i + 1]), to[i]);
+      const float trust_left_below = between(trust_code(below[i]), trust_code(below[i + 1]), from[i]);
+      const float trust_right_below = between(trust_code(below[i]), trust_code(below[i + 1]), to[i]);
       least[i] = smaller(
           least[i],
           smaller(

@@ -63,6 +63,14 @@ struct SourceSight {
   [[nodiscard]] Bounds of_cells(int x0, int y0, int x1, int y1) const;
 };
 
+// The halves of a texel. Through signed integers, which processors convert many at once.
+inline float depth_code(SourceSight::Texel t) {
+  return static_cast<float>(static_cast<std::int32_t>(t >> 16U));
+}
+inline float trust_code(SourceSight::Texel t) {
+  return static_cast<float>(static_cast<std::int32_t>(t & 0xFFFFU));
+}
+
 // Empty where the photo shows everything that lies in its picture: no mask, and a proxy that hides nothing of itself
 // from views (a plane; walls seen from inside).
 [[nodiscard]] SourceSight make_sight(const CameraModel&, const Rigid3& cam_from_world, const ImageU8& mask,
