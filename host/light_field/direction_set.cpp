@@ -181,4 +181,11 @@ std::vector<CellSample> split_cell(const DirectionSet& set, std::size_t i, int s
   return parts;
 }
 
+std::vector<CellSample> split_cell(const DirectionSet& set, std::size_t i, int splits,
+                                   const Eigen::Matrix3f& world_from_plane) {
+  std::vector<CellSample> parts = split_cell(set, i, splits);
+  for (CellSample& part : parts) part.direction = world_from_plane * part.direction;
+  return parts;
+}
+
 }  // namespace mf

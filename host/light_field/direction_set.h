@@ -43,6 +43,9 @@ struct CellSample {
 // Cuts cell i into parts of about the same shape that tile it: triangles of a fan about its direction, each split
 // `splits` times in two across its longest edge (so about 6 · 2^splits parts).
 [[nodiscard]] std::vector<CellSample> split_cell(const DirectionSet&, std::size_t i, int splits);
+// The same with directions in the world.
+[[nodiscard]] std::vector<CellSample> split_cell(const DirectionSet&, std::size_t i, int splits,
+                                                 const Eigen::Matrix3f& world_from_plane);
 
 // Where a direction falls among its neighbours: barycentric weights over three directions (sum 1, none negative).
 struct DirectionWeights {

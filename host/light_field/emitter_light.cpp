@@ -35,8 +35,8 @@ class DrawnLight {
       if (!may_meet_emitter(field_.emitters, p, direction, angle)) continue;
       if (parts.empty()) {
         light.assign(static_cast<std::size_t>(side_ * side_), Eigen::Vector3f::Zero());
-        parts = split_cell(field_.directions, cell, splits_near_emitter(field_.directions.solid_angles_sr[cell]));
-        for (CellSample& part : parts) part.direction = world_from_plane_ * part.direction;
+        const int splits = splits_near_emitter(field_.directions.solid_angles_sr[cell]);
+        parts = split_cell(field_.directions, cell, splits, world_from_plane_);
       }
       light[static_cast<std::size_t>(i)] = mean_over(parts, p);
     }

@@ -98,15 +98,7 @@ HoleFiller::HoleFiller(const LightField& field) : field_(field) {
   pull_push(closed_.panorama, true, 1);
 }
 
-HoleFiller::Parts HoleFiller::parts_of(std::size_t direction) const {
-  const Eigen::Matrix3f turn = field_.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
-  Parts parts = split_cell(field_.directions, direction, 1);
-  for (CellSample& part : parts) part.direction = turn * part.direction;
-  return parts;
-}
-
-// p in the world.
-Eigen::Vector3f HoleFiller::guess(const Parts& parts, const Eigen::Vector3f& p) const {
+Eigen::Vector3f HoleFiller::guess(const std::vector<CellSample>& parts, const Eigen::Vector3f& p) const {
   Eigen::Vector4f sum = Eigen::Vector4f::Zero();
   for (const CellSample& part : parts) {
     const Eigen::Vector3f& d = part.direction;
@@ -130,7 +122,8 @@ std::size_t HoleFiller::fill(std::size_t direction, const PlaneRectangle& plane,
     std::copy(image.data.begin(), image.data.end(), tile->data());
     return holes;
   }
-  const Parts parts = parts_of(direction);
+  const std::vector<CellSample> parts = split_cell(
+      field_.directions, direction, 1, field_.plane.world_from_plane.rotation.toRotationMatrix().cast<float>());
   const auto guess_at = [&](double x, double y) {
     return guess(parts, (plane.world_from_plane * Eigen::Vector3d(x, y, 0)).cast<float>());
   };

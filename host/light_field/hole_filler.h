@@ -35,10 +35,8 @@ class HoleFiller {
                    int spacing = 1) const;
 
  private:
-  // A cell of the hemisphere, in the world.
-  using Parts = std::vector<CellSample>;
-  [[nodiscard]] Parts parts_of(std::size_t direction) const;
-  [[nodiscard]] Eigen::Vector3f guess(const Parts&, const Eigen::Vector3f& p) const;
+  // Of a cell in these parts, at p; both in the world.
+  [[nodiscard]] Eigen::Vector3f guess(const std::vector<CellSample>& parts, const Eigen::Vector3f& p) const;
 
   const LightField& field_;
   Surroundings closed_;  // the panorama without holes; its weight 1 everywhere, or 0 when nothing was seen at all

@@ -49,9 +49,7 @@ Rectangle inside(const LightField& field, const TileRequest& request) {
 // An empty tile whose outermost texels' centres lie on the rectangle's sides: nothing within is extrapolated.
 PlaneTile even_tile(const Rectangle& r, int texels) {
   const Eigen::Vector2f half = (r.max_m - r.min_m) / (2.F * static_cast<float>(texels - 1));
-  PlaneTile tile{r.min_m - half, r.max_m + half, texels, texels, {}};
-  tile.texels.assign(static_cast<std::size_t>(texels) * static_cast<std::size_t>(texels), Eigen::Vector4f::Zero());
-  return tile;
+  return black_tile(r.min_m - half, r.max_m + half, texels, texels);
 }
 
 // One thread's working memory: a light field of few texels, whose rectangle is the request's.
@@ -126,8 +124,7 @@ std::vector<PlaneTile> over_the_plane(const std::vector<FieldView>& views, const
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(), [&](std::size_t i) {
     PlaneTile& tile = tiles[i];
-    tile = {part.plane.min_m.cast<float>(), part.plane.max_m.cast<float>(), part.resolution, part.resolution, {}};
-    tile.texels.assign(part.texel_count(), Eigen::Vector4f::Zero());
+    tile = black_tile(part.plane.min_m.cast<float>(), part.plane.max_m.cast<float>(), part.resolution, part.resolution);
     const std::vector<std::size_t> cells(requests[i].cells.begin(), requests[i].cells.end());
     std::vector<Eigen::Vector4f> of_cells(std::min(cells_at_once, cells.size()) * part.texel_count());
     float solid_angle = 0;

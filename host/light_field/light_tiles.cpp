@@ -17,6 +17,12 @@ std::vector<PlaneImage> images_of(const LightField& field) {
   return images;
 }
 
+PlaneTile black_tile(const Eigen::Vector2f& min_m, const Eigen::Vector2f& max_m, int width, int height) {
+  PlaneTile tile{min_m, max_m, width, height, {}};
+  tile.texels.assign(tile.image().texel_count(), Eigen::Vector4f::Zero());
+  return tile;
+}
+
 std::vector<PlaneTile> merged_tiles(const DirectionSet& directions, std::span<const PlaneImage> images,
                                     std::span<const TileRequest> requests) {
   check(images.size() == directions.size() && !images.empty(), "an image for each direction");
@@ -24,8 +30,7 @@ std::vector<PlaneTile> merged_tiles(const DirectionSet& directions, std::span<co
   std::vector<PlaneTile> tiles(requests.size());
   tbb::parallel_for(std::size_t{0}, requests.size(), [&](std::size_t r) {
     PlaneTile& tile = tiles[r];
-    tile = {first.min_m, first.max_m, first.width, first.height, {}};
-    tile.texels.assign(first.texel_count(), Eigen::Vector4f::Zero());
+    tile = black_tile(first.min_m, first.max_m, first.width, first.height);
     float solid_angle = 0;
     for (const std::uint32_t cell : requests[r].cells) solid_angle += directions.solid_angles_sr[cell];
     for (const std::uint32_t cell : requests[r].cells) {

@@ -49,6 +49,8 @@ struct PlaneTile {
   [[nodiscard]] Eigen::Vector2f position(int column, int row) const { return image().position(column, row); }
 };
 
+[[nodiscard]] PlaneTile black_tile(const Eigen::Vector2f& min_m, const Eigen::Vector2f& max_m, int width, int height);
+
 // Light that a picture asks for: the cells of a DirectionSet that it takes as one, and the part of the plane at which
 // it looks them up (plane coordinates, metres).
 struct TileRequest {

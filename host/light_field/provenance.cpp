@@ -30,8 +30,8 @@ std::size_t Provenance::block_at(const PlaneRectangle& plane, int resolution, st
 }
 
 Provenance trace_provenance(const std::vector<FieldView>& views, const LightField& field,
-                            const EmitterBlender& emitters, const PenaltyOptions& penalty,
-                            std::vector<std::string> frame_names) {
+                            const ProxyVisibility& visibility, const EmitterBlender& emitters,
+                            const PenaltyOptions& penalty, std::vector<std::string> frame_names) {
   Provenance out;
   out.side = (field.resolution + Provenance::block_texels - 1) / Provenance::block_texels;
   out.k = penalty.k;
@@ -41,7 +41,6 @@ Provenance trace_provenance(const std::vector<FieldView>& views, const LightFiel
   out.emitter.resize(blocks);
   const float texel_m = static_cast<float>(field.plane.size_m().maxCoeff()) / static_cast<float>(field.resolution);
   const Eigen::Matrix3f turn = field.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
-  const ProxyVisibility visibility(views, field.surroundings, field.plane);
   tbb::parallel_for(std::size_t{0}, field.directions.size(), [&](std::size_t i) {
     for (int y = 0; y < out.side; ++y)
       for (int x = 0; x < out.side; ++x) {

@@ -11,6 +11,7 @@
 #include "host/light_field/emitter_blender.h"
 #include "host/light_field/field_views.h"
 #include "host/light_field/light_field.h"
+#include "host/light_field/proxy_visibility.h"
 
 namespace mf {
 
@@ -46,8 +47,9 @@ struct Provenance {
 };
 
 // `field` has everything but its texels. `frame_names`: of the calibration, which FieldView::frame indexes.
-[[nodiscard]] Provenance trace_provenance(const std::vector<FieldView>&, const LightField& field, const EmitterBlender&,
-                                          const PenaltyOptions&, std::vector<std::string> frame_names);
+[[nodiscard]] Provenance trace_provenance(const std::vector<FieldView>&, const LightField& field,
+                                          const ProxyVisibility&, const EmitterBlender&, const PenaltyOptions&,
+                                          std::vector<std::string> frame_names);
 
 // An EXR with a row a direction and a pixel a block (docs/light_field.md, "Provenance"). Written aside and renamed.
 // Both throw InputError naming the file.

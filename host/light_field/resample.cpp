@@ -69,9 +69,9 @@ struct Resampling::Impl {
   LightField field;
   std::vector<SphereScore> sphere_scores;
   double focusing_s = 0;
+  std::optional<ProxyVisibility> visibility;
   // The plane needs the first and its tiles, every other proxy the others.
   std::optional<RectifiedViews> rectified;
-  std::optional<ProxyVisibility> visibility;
   std::optional<EmitterBlender> emitters;
   std::optional<tbb::enumerable_thread_specific<PlaneTiles>> plane_tiles;
   std::optional<tbb::enumerable_thread_specific<TileResampler>> resamplers;
@@ -96,11 +96,11 @@ Resampling::Resampling(const std::vector<FieldView>& views, const PlaneRectangle
   field.surroundings = std::move(choice.surroundings);
   i.sphere_scores = std::move(choice.sphere_scores);
   field.options_json = options_to_json(options, k, field.surroundings);
+  i.visibility.emplace(views, field.surroundings, rectangle);
   if (field.surroundings.is_plane()) {
     i.rectified.emplace(views, rectangle, options.size);
     i.plane_tiles.emplace([&i, k] { return PlaneTiles(*i.rectified, i.field, k); });
   } else {
-    i.visibility.emplace(views, field.surroundings, rectangle);
     i.emitters.emplace(views, field.surroundings, emitters, rectangle, team);
     field.emitters = i.emitters->emitters();
     field.surroundings.panorama = make_panorama(views, field.surroundings, *i.emitters, panorama_width, team);
@@ -157,8 +157,8 @@ Provenance Resampling::provenance(std::vector<std::string> frame_names) const {
   // The plane goes without emitters.
   const EmitterBlender none(impl_->views, impl_->field.surroundings, std::vector<ShadedEmitter>{},
                             EmitterBlender::Lit::yes);
-  return trace_provenance(impl_->views, impl_->field, impl_->emitters ? *impl_->emitters : none, impl_->penalty,
-                          std::move(frame_names));
+  return trace_provenance(impl_->views, impl_->field, *impl_->visibility, impl_->emitters ? *impl_->emitters : none,
+                          impl_->penalty, std::move(frame_names));
 }
 
 // ---- all of them ----

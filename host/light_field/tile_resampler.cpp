@@ -67,8 +67,7 @@ void TileResampler::fill(std::size_t direction, Eigen::Vector4f* tile) {
 void TileResampler::prepare(std::size_t i) {
   const Eigen::Matrix3f world_from_plane = field_.plane.world_from_plane.rotation.toRotationMatrix().cast<float>();
   cell_.direction = world_from_plane * field_.directions.directions[i];
-  cell_.parts = split_cell(field_.directions, i, cell_splits_);
-  for (CellSample& part : cell_.parts) part.direction = world_from_plane * part.direction;
+  cell_.parts = split_cell(field_.directions, i, cell_splits_, world_from_plane);
   cell_.angle_rad = std::sqrt(field_.directions.solid_angles_sr[i]);
   cell_.part_angle_rad = cell_.angle_rad / std::sqrt(static_cast<float>(cell_.parts.size()));
   bool emitter = false;
@@ -81,8 +80,8 @@ void TileResampler::prepare(std::size_t i) {
     }
   cell_.fine_parts.clear();
   if (!emitter) return;
-  cell_.fine_parts = split_cell(field_.directions, i, splits_near_emitter(field_.directions.solid_angles_sr[i]));
-  for (CellSample& part : cell_.fine_parts) part.direction = world_from_plane * part.direction;
+  const int splits = splits_near_emitter(field_.directions.solid_angles_sr[i]);
+  cell_.fine_parts = split_cell(field_.directions, i, splits, world_from_plane);
 }
 
 // The others see none of the tile's proxy points, as their outline in the view lies beside its picture.

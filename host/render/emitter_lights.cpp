@@ -64,9 +64,7 @@ Rectangle seen_through(const Bounds& box, const Eigen::Vector3f& centre, float r
 // A black tile with texels as fine as the mask's.
 PlaneTile empty_tile(const Rectangle& where, const Eigen::Vector2f& mask_texel_m) {
   const Eigen::Array2f texels = ((where.high - where.low).array() / mask_texel_m.array()).ceil().max(2.F);
-  PlaneTile tile{where.low, where.high, static_cast<int>(texels.x()), static_cast<int>(texels.y()), {}};
-  tile.texels.assign(tile.image().texel_count(), Eigen::Vector4f::Zero());
-  return tile;
+  return black_tile(where.low, where.high, static_cast<int>(texels.x()), static_cast<int>(texels.y()));
 }
 
 // The middles of a tile's texels, in the world.

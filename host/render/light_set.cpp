@@ -42,21 +42,18 @@ std::vector<float> weights_on_plane(const LightSet& set) {
 // many as one of them has.
 PlaneTile empty_tile_over(const LightSet& set) {
   constexpr float beyond = std::numeric_limits<float>::max();
-  PlaneTile tile{Eigen::Vector2f::Constant(beyond), Eigen::Vector2f::Constant(-beyond), 0, 0, {}};
+  Eigen::Vector2f low = Eigen::Vector2f::Constant(beyond), high = -low;
   Eigen::Vector2f texel = Eigen::Vector2f::Constant(beyond), most = Eigen::Vector2f::Constant(64);
   for (const DirectionalLight& light : set.lights) {
     const PlaneImage& image = set.images[light.image];
     const Eigen::Vector2f texels(static_cast<float>(image.width), static_cast<float>(image.height));
-    tile.min_m = tile.min_m.cwiseMin(image.min_m);
-    tile.max_m = tile.max_m.cwiseMax(image.max_m);
+    low = low.cwiseMin(image.min_m);
+    high = high.cwiseMax(image.max_m);
     texel = texel.cwiseMin((image.max_m - image.min_m).cwiseQuotient(texels));
     most = most.cwiseMax(texels);
   }
-  const Eigen::Vector2f texels = (tile.max_m - tile.min_m).cwiseQuotient(texel).cwiseMin(most);
-  tile.width = static_cast<int>(std::lround(texels.x()));
-  tile.height = static_cast<int>(std::lround(texels.y()));
-  tile.texels.assign(tile.image().texel_count(), Eigen::Vector4f::Zero());
-  return tile;
+  const Eigen::Vector2f texels = (high - low).cwiseQuotient(texel).cwiseMin(most);
+  return black_tile(low, high, static_cast<int>(std::lround(texels.x())), static_cast<int>(std::lround(texels.y())));
 }
 
 bool same_grid(const PlaneImage& a, const PlaneImage& b) {
